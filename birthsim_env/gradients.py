@@ -49,8 +49,8 @@ class Recorder:
     def run(self, periods: int, threads: int) -> int:
         """The simulation's loop, taped."""
         self.prepare()
-        tape = self._loop.new_tape(periods)
-        missed = self._loop.run_taped(periods, tape, threads)
+        tape = self.loop.new_tape(periods)
+        missed = self.loop.run_taped(periods, tape, threads)
         self._last = tape, periods
         return missed
 
@@ -61,7 +61,7 @@ class Recorder:
         ``reward`` (N,), ``observation`` (N, D), ``state`` (18, N) and ``motion`` (4, N), x, y, vx, vy. It returns those carried
         to the step before, and those to the action (size, N).
         """
-        (tape, periods), rig, loop, at = self._last, self._simulation.plant.lane_parameters.copy(), self._loop, self._at
+        (tape, periods), rig, loop, at = self._last, self._simulation.plant.lane_parameters.copy(), self.loop, self.at
         lanes = self._simulation.plant.num_envs
 
         def back(
@@ -89,7 +89,7 @@ class Recorder:
             raise ValueError(f"{own[0]}, a user's own part, cannot be differentiated; allowed: those of the package")
         named = [(name, one) for name, group in parts.items() for one in group if isinstance(one, Stage)]
         stages, closing = [one for _, one in named], list(simulation.closing)
-        self._loop = loop = TapedLoop(simulation.plant.num_envs, *places, stages, closing)
+        self.loop = loop = TapedLoop(simulation.plant.num_envs, *places, stages, closing)
         free = OF_TIME if simulation.user_force.closed_loop else (*OF_TIME, "hand")
         pieces: list[tuple[int, Stage | Traced]] = []
         for k, (name, stage) in enumerate([*named, *(("closing", one) for one in closing)]):
@@ -117,14 +117,14 @@ class Recorder:
         live = sorted(active & _grown(set(given), [one.feeds for one in reversed(traced)]) | given)
         read = set(ROWS).union(*(one.feeds(set(live)) for one in traced))
         rows["carried"], rows["live"] = [row for row in live if row in read and row not in rows["action"]], live
-        self.carried, self._at = np.array(rows["carried"]), {name: np.searchsorted(live, own) for name, own in rows.items()}
+        self.carried, self.at = np.array(rows["carried"]), {name: np.searchsorted(live, own) for name, own in rows.items()}
         found = []
         for k, piece in pieces:
             one = piece.adjoint(set(live)) if isinstance(piece, Traced) else plant_adjoint(piece)
             if one is not None:
                 one.after = isinstance(piece, Traced) and piece.name == "motion"
                 found.append((k, one))
-        self._loop.differentiate(found, live)
+        self.loop.differentiate(found, live)
 
 
 def _grown(rows: set[int], ways: Sequence[Callable[[set[int]], set[int]]]) -> set[int]:

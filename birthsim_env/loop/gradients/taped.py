@@ -69,8 +69,8 @@ def _backward(
     entries: Whole, touched: Whole, periods: int, first: int, last: int, rig: Array, tape: Array, bars: Array, most: Whole
 ) -> None:
     """``entries`` (E, 6): address of an adjoint, of its constants, rows that it reads from the tape, where its rows stand in
-    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back. ``most`` (2,) are rows that an adjoint takes, and that it needs for
-    what it gives."""
+    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back. ``most`` (2,): rows that an
+    adjoint takes, and that it needs for what it gives."""
     space, p = np.empty((bars.shape[0], BLOCK)), np.empty((at.PARAMETERS, BLOCK))
     given, result = np.zeros((most[0], BLOCK)), np.zeros((most[1], BLOCK))
     for start in range(first, last, BLOCK):

@@ -49,8 +49,8 @@ def adjoint(tape, bars, out, rig, constants, lane, n):
 class Adjoint:
     """How the bars of a stage go back: its ``function``, and the rows whose bars it takes and gives.
 
-    The rows that it ``reads`` of the space are kept on the tape before the stage, or ``after`` it. Behind the bars that it gives
-    are ``room`` rows for what it computes meanwhile.
+    The rows that it ``reads`` of the space are kept on the tape before the stage, or ``after`` it. It computes in ``room``
+    rows behind the bars that it gives.
     """
 
     function: Callable[..., int]
