@@ -34,12 +34,27 @@ REWARDED, OBSERVED = 0, 3
 Pullback = Callable[..., tuple[Array, Array]]
 
 
+def weigh(
+    bars: Any, at: dict[str, Any], carried: Any = None, reward: Any = None, observation: Any = None, state: Any = None,
+    motion: Any = None,
+) -> None:  # fmt: skip
+    """Add gradients, see ``Recorder.taken``, to the rows ``at`` which their bars (rows, N) stand."""
+    seen = None if observation is None else observation.T
+    given = {"carried": carried, "reward": reward, "observation": seen, "state": state, "motion": motion}
+    for name, gradient in given.items():
+        if gradient is not None:
+            bars[at[name]] += gradient
+
+
 class Recorder:
     """Runs a simulation in place of its loop, and keeps what going back needs.
 
     ``carried`` (C,) are rows of the loop's space, and of tables after it, that hand gradients from one policy step to the one
     before: state, memories, and what is measured. Raises ``ValueError`` that names what cannot be differentiated.
     """
+
+    arrays: Any = np
+    """The module of all arrays."""
 
     def __init__(self, simulation: Simulation) -> None:
         require_plain(simulation.plant)
@@ -54,6 +69,10 @@ class Recorder:
         self._last = tape, periods
         return missed
 
+    def reached(self) -> tuple[Array, Array]:
+        """Motion (4, N) of the end effector and state (18, N) of the plant now."""
+        return self._simulation.motion, self._simulation.plant.state.copy()
+
     def taken(self) -> Pullback:
         """The pullback of the last policy step: ``back(carried=None, reward=None, observation=None, state=None, motion=None)``.
 
@@ -62,17 +81,10 @@ class Recorder:
         to the step before, and those to the action (size, N).
         """
         (tape, periods), rig, loop, at = self._last, self._simulation.plant.lane_parameters.copy(), self.loop, self.at
-        lanes = self._simulation.plant.num_envs
 
-        def back(
-            carried: Array | None = None, reward: Array | None = None, observation: Any = None, state: Array | None = None,
-            motion: Array | None = None,
-        ) -> tuple[Array, Array]:  # fmt: skip
-            bars, seen = np.zeros((len(at["live"]), lanes)), None if observation is None else observation.T
-            given = {"carried": carried, "reward": reward, "observation": seen, "state": state, "motion": motion}
-            for name, gradient in given.items():
-                if gradient is not None:
-                    bars[at[name]] += gradient
+        def back(**given: Any) -> tuple[Array, Array]:
+            bars = np.zeros((len(loop.live), rig.shape[1]))
+            weigh(bars, at, **given)
             loop.back(periods, tape, rig, bars, self._simulation.threads)
             return bars[at["carried"]], bars[at["action"]]
 
