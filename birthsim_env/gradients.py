@@ -66,7 +66,8 @@ class Recorder:
         self.prepare()
         tape = self.loop.new_tape(periods)
         missed = self.loop.run_taped(periods, tape, threads)
-        self._last = tape, periods
+        # A lane whose episode ends gets another rig before anybody asks for the pullback.
+        self._last = tape, periods, self._simulation.plant.lane_parameters.copy()
         return missed
 
     def reached(self) -> tuple[Array, Array]:
@@ -80,7 +81,7 @@ class Recorder:
         ``reward`` (N,), ``observation`` (N, D), ``state`` (18, N) and ``motion`` (4, N), x, y, vx, vy. It returns those carried
         to the step before, and those to the action (size, N).
         """
-        (tape, periods), rig, loop, at = self._last, self._simulation.plant.lane_parameters.copy(), self.loop, self.at
+        (tape, periods, rig), loop, at = self._last, self.loop, self.at
 
         def back(**given: Any) -> tuple[Array, Array]:
             bars = np.zeros((len(loop.live), rig.shape[1]))

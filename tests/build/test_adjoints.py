@@ -61,8 +61,8 @@ def flat(tape: Any, lanes: int) -> Any:
 
 def back_here(made: Made, bars: Any) -> Any:
     """What ``TapedLoop`` makes of bars over the last policy step."""
-    (tape, periods), found = made.recorder._last, bars.copy()
-    made.recorder.loop.back(periods, tape, made.simulation.plant.lane_parameters, found)
+    (tape, periods, rig), found = made.recorder._last, bars.copy()
+    made.recorder.loop.back(periods, tape, rig, found)
     return found
 
 
