@@ -53,6 +53,20 @@ def test_the_end_of_an_episode_cuts_gradients() -> None:
     assert float(actions[1].grad.abs().max()) > 0.0
 
 
+def test_the_last_step_of_an_episode_has_the_gradients_of_any_other() -> None:
+    """Where the next episode has another rig."""
+    found = []
+    for steps in (1, 2):
+        worlds = worlds_of(3, randomize=True, max_episode_steps=steps)
+        action = torch.full((3, 4), 0.05, requires_grad=True)
+        now = worlds.step(worlds.reset(seed=1), action)
+        assert bool(now.ended.all()) == (steps == 1)
+        now.reward.sum().backward()
+        found.append(action.grad.numpy())
+    assert np.abs(found[0]).max() > 0.0
+    np.testing.assert_array_equal(*found)
+
+
 def test_worlds_that_end_otherwise_are_refused() -> None:
     with pytest.raises(ValueError, match="SameStep"):
         Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2))
