@@ -13,7 +13,13 @@ BEYOND = {
         "vector_env.BirthSIMVectorEnv",
         "parts.actuation.Actuation",
     ),
-    "baselines": ("staged.StagedController", "staged.LawStage", "bench.evaluation.table"),
+    "baselines": (
+        "staged.StagedController",
+        "staged.LawStage",
+        "bench.evaluation.table",
+        "rivals.symbolic.symbolic_model",
+        "rivals.symbolic.SymbolicModel",
+    ),
     "agents": (),
 }
 """Package -> names that pages speak of, beside those in its ``__all__``."""
