@@ -2,10 +2,10 @@
 
 import inspect
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from gymnasium import spaces
@@ -24,8 +24,54 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, shown
 from birthsim_env.simulation import Simulation
 
+F = TypeVar("F", bound=Callable[..., Any])
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
+
+
+class Arguments(TypedDict, total=False):
+    """The arguments of ``gym.make``; ``BirthSIMEnv`` says what they mean."""
+
+    action_mode: str
+    valves: str
+    sensors: str
+    randomize: Randomize
+    reference: Any
+    user_force: Any
+    stiffness: Any
+    parameters: Parameters | Mapping[str, Any] | str | Path | None
+    policy_period: float
+    duration: float | None
+    actuation: Actuation | None
+    picture_size: tuple[int, int]
+    num_threads: int | None
+    force_sensor: bool
+    clip_actions: bool
+
+
+DEFAULTS: Arguments = {
+    "action_mode": "valve", "valves": "two_valves", "sensors": "ideal", "randomize": False, "reference": None,
+    "user_force": None, "stiffness": None, "parameters": None, "policy_period": 0.01, "duration": None, "actuation": None,
+    "picture_size": (640, 480), "num_threads": None, "force_sensor": True, "clip_actions": False,
+}  # fmt: skip
+
+
+def spelled_out(*less: str) -> Callable[[F], F]:
+    """Gives a function with ``**arguments: Unpack[Arguments]`` a signature that names them all, but for those in ``less``."""
+
+    def decorate(function: F) -> F:
+        signature = inspect.signature(function)
+        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        more = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Arguments.__annotations__[name])
+            for name, default in DEFAULTS.items()
+            if name not in less
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *more])  # type: ignore[attr-defined]
+        return function
+
+    return decorate
+
 
 LONGEST, LONGEST_PERIOD = 3600.0, 1.0
 """s: the longest episode, and the longest time for which an action is held."""
@@ -85,38 +131,27 @@ class Setup:
         return max(1, round(self.duration / self.policy_period))
 
 
-def assemble(
-    num_envs: int,
-    scenario: str,
-    action_mode: str = "valve",
-    valves: str = "two_valves",
-    sensors: str = "ideal",
-    randomize: Randomize = False,
-    reference: Any = None,
-    user_force: Any = None,
-    stiffness: Any = None,
-    parameters: Parameters | Mapping[str, Any] | str | Path | None = None,
-    policy_period: float = 0.01,
-    duration: float | None = None,
-    actuation: Actuation | None = None,
-    picture_size: tuple[int, int] = (640, 480),
-    num_threads: int | None = None,
-    force_sensor: bool = True,
-    clip_actions: bool = False,
-    **unknown: Any,
-) -> Setup:
+def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Setup:
     """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed, and
     ``TypeError`` for arguments that there are not."""
-    refuse_unknown(unknown)
+    refuse_unknown(arguments)
+    given: Arguments = {**DEFAULTS, **arguments}
+    valves, sensors, randomize, actuation = given["valves"], given["sensors"], given["randomize"], given["actuation"]
+    reference, user_force, stiffness, duration = (
+        given["reference"],
+        given["user_force"],
+        given["stiffness"],
+        given["duration"],
+    )
     table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
-    rig = load_parameters(parameters)
+    rig = load_parameters(given["parameters"])
     one_of("valves", valves, VALVE_LAYOUTS)
     one_of("sensors", sensors, tuple(SENSORS))
-    one_of("force_sensor", force_sensor, (True, False))
-    one_of("clip_actions", clip_actions, (True, False))
+    one_of("force_sensor", given["force_sensor"], (True, False))
+    one_of("clip_actions", given["clip_actions"], (True, False))
     if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
         raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object with {', '.join(PROTOCOL)}")
-    chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
+    chosen = actuation or ACTUATIONS[one_of("action_mode", given["action_mode"], tuple(ACTUATIONS))](valves)
     for name, length, most in (("size", chosen.size, MOST_ACTIONS), ("memory_names", len(chosen.memory_names), MOST_SHOWN)):
         if not length <= most:
             raise ValueError(f"actuation.{name} has a length of {length}; allowed: at most {most}")
@@ -143,9 +178,9 @@ def assemble(
         default_stiffness if stiffness is None else stiffness_of(stiffness),
         sensors,
         chosen,
-        policy_periods(policy_period, rig),
-        threads_for(num_envs, num_threads),
-        force_sensor,
+        policy_periods(given["policy_period"], rig),
+        threads_for(num_envs, given["num_threads"]),
+        given["force_sensor"],
     )
     limit = observation.LIMIT
     names = (*(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
@@ -154,10 +189,10 @@ def assemble(
         simulation,
         chosen,
         float(duration or table.duration),
-        float(policy_period),
-        clip_actions,
+        float(given["policy_period"]),
+        given["clip_actions"],
         table.title,
-        checked_size("picture_size", picture_size),
+        checked_size("picture_size", given["picture_size"]),
         spaces.Box(-limit, limit, (size,), np.float32),
         spaces.Box(-1.0, 1.0, (chosen.size,), np.float32),
         (*(str(entry) for entry in observation.ENTRIES), *names),
@@ -174,10 +209,9 @@ def threads_for(num_envs: int, num_threads: int | None) -> int:
 
 
 def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Sequence[str] = ()) -> None:
-    """Raise ``TypeError``, as Python does, for argument names that ``assemble`` has not; ``more`` and ``less`` than its own are
+    """Raise ``TypeError``, as Python does, for names that are none of ``Arguments``; ``more`` and ``less`` than these are
     allowed in a derived environment."""
-    own = [name for name in inspect.signature(assemble).parameters if name not in ("num_envs", "scenario", "unknown", *less)]
-    known = [*more, *own, "render_mode"]
+    known = [*more, *(name for name in DEFAULTS if name not in less), "render_mode"]
     wrong = [name for name in unknown if name not in known]
     if wrong:
         # In Python's words: TorchRL, for one, looks for them.

@@ -1,14 +1,14 @@
 """The single environment: one lane of the simulation."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import RENDER_MODES, assemble, one_of
+from birthsim_env.assembly import RENDER_MODES, Arguments, assemble, one_of, spelled_out
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.face import Face
@@ -86,9 +86,10 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Info
     The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`, as NumPy numbers and arrays. The
-    reward terms, which are zero after `reset`. `is_success`: whether the settled error has been below 1 mm so far and the
-    episode has not terminated. The settled error is the root mean square distance from the compliant target, from 0.5 s after
-    a jump on.
+    reward terms, which are zero after `reset`. `cost` is 1 where a constraint is violated, which `stop_depth` and
+    `pressure_excess` name, as in Safety-Gymnasium; the episode goes on. `is_success`: whether the settled error has been below
+    1 mm so far and the episode has not terminated. The settled error is the root mean square distance from the compliant
+    target, from 0.5 s after a jump on.
 
     ## Arguments
     - `action_mode`, `valves`: see above.
@@ -134,7 +135,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     # Gymnasium declares it as an instance variable with a default.
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
 
-    def __init__(self, scenario: str, render_mode: str | None = None, **arguments: Any) -> None:
+    @spelled_out()
+    def __init__(self, scenario: str, render_mode: str | None = None, **arguments: Unpack[Arguments]) -> None:
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         setup = assemble(1, scenario, **arguments)
         self.observation_space: spaces.Space[Any] = setup.single_observation_space

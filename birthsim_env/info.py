@@ -1,5 +1,7 @@
 """The ``info`` of the environments: the true state of the rig and its task in SI units."""
 
+import math
+
 import numpy as np
 
 from birthsim_env.loop.rows import Signals, World
@@ -33,6 +35,11 @@ class Info(Rows):
     pneumatic_stiffness_setpoint = rows(2, "N/m", "of both cylinders")
     supply_flow = row("kg/s", "drawn from the supply")
     impact_speed = rows(2, "m/s", "fastest collision of each piston with an end stop in the last step; 0 where none")
+    stop_depth = rows(2, "m", "how far each piston is in an end stop; 0 where it is in none")
+    pressure_excess = rows(4, "Pa", "how far chambers P1, N1, P2, N2 are above the supply or below the atmosphere, else 0")
+    hand_force = row("N", "magnitude of the user force")
+    air_used = row("kg", "drawn from the supply since the episode began: supply_flow times the policy period, summed")
+    cost = row("1", "1 where stop_depth or pressure_excess is more than 0, else 0")
 
 
 FIELDS = {name: (count, f"{unit}, {about}") for name, unit, about, count in Info.entries()}
@@ -41,7 +48,7 @@ FIELDS = {name: (count, f"{unit}, {about}") for name, unit, about, count in Info
 
 @helper
 def describe(world: World, seen: Signals, info: Info, n: int) -> None:
-    """Writes all fields of n lanes."""
+    """Writes all fields of n lanes but ``air_used``, which needs the past."""
     state, p = world.state, world.rig
     reference, motion = seen.reference, world.motion
     for i in range(n):
@@ -76,6 +83,26 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
         for k in range(4):
             inflow, _ = dynamics.flows_of(state, p, i, at.PRESSURES[k], at.TEMPERATURES[k], at.SPOOLS[k])
             info.supply_flow[i] += max(inflow, 0.0)
+    _describe_costs(world, info, n)
+
+
+@helper
+def _describe_costs(world: World, info: Info, n: int) -> None:
+    """What violates a constraint, and how hard the hand is pushed, in loops without a branch, which LLVM vectorises."""
+    state, p = world.state, world.rig
+    for i in range(n):
+        fx, fy = world.force[0, i], world.force[1, i]
+        info.hand_force[i] = math.sqrt(fx * fx + fy * fy)
+        info.stop_depth[0, i] = max(abs(state[at.Y1, i]) - p[at.HALF_L1, i], 0.0)
+        info.stop_depth[1, i] = max(abs(state[at.Y2, i]) - p[at.HALF_L2, i], 0.0)
+        info.cost[i] = max(info.stop_depth[0, i], info.stop_depth[1, i])
+    for k in range(4):
+        for i in range(n):
+            pressure = state[at.PRESSURES[k], i]
+            info.pressure_excess[k, i] = max(pressure - p[at.SUPPLY, i], max(p[at.ATMOSPHERE, i] - pressure, 0.0))
+            info.cost[i] = max(info.cost[i], info.pressure_excess[k, i])
+    for i in range(n):
+        info.cost[i] = 1.0 if info.cost[i] > 0.0 else 0.0
 
 
 _PLACES = {name: group.first if group.single else group.place for name, group in Info.groups.items()}

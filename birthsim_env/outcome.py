@@ -20,6 +20,7 @@ class Memory(Rows):
     owed = part(reward.Owed, "for the reward")
     tally = part(success.Tally, "for success")
     fresh = row("1", "1 where an episode begins")
+    air = row("kg", "drawn from the supply")
     action = rows(0, "1", "the last action")
 
 
@@ -45,6 +46,7 @@ class About(Numbers):
 def _close(world: World, seen: Seen, memory: int, about: About, tables: int, lane: int, n: int) -> int:
     size, mine, reference = int(about.actions), slice(lane, lane + n), seen.reference
     own, ends = Memory(block(memory, Memory.size + size)), Ends(table2(tables, 1)[:, mine])
+    told = info.Info(table2(tables, 2)[:, mine])
     action = seen.action[:size]
     if about.stepped > 0.0:
         terms = reward.Terms(table2(tables, 0)[:, mine])
@@ -62,7 +64,10 @@ def _close(world: World, seen: Seen, memory: int, about: About, tables: int, lan
                 for axis in range(2):
                     own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
                 own.fresh[i], ends.failed[i], ends.success[i] = 0.0, 0.0, 0.0
-    info.describe(world, seen, info.Info(table2(tables, 2)[:, mine]), n)
+    info.describe(world, seen, told, n)
+    for i in range(n):
+        own.air[i] += told.supply_flow[i] * (about.limits.period * about.stepped)
+        told.air_used[i] = own.air[i]
     shown = seen.shown[: int(about.shown)]
     observation.look(seen, own.action, shown, about.rig, about.scales, singles(tables, 3)[mine], n)
     return 0

@@ -2,14 +2,14 @@
 
 import copy
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import RENDER_MODES, assemble, one_of
+from birthsim_env.assembly import RENDER_MODES, Arguments, assemble, one_of, spelled_out
 from birthsim_env.episodes import Episodes
 from birthsim_env.face import Face
 from birthsim_env.info import vector_info
@@ -46,6 +46,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012  Gymnasium declares it so
 
+    @spelled_out()
     def __init__(
         self,
         scenario: str,
@@ -54,7 +55,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         device: str | None = None,
-        **arguments: Any,
+        **arguments: Unpack[Arguments],
     ) -> None:
         checked_count("num_envs", num_envs, 1, MOST_LANES)
         if isinstance(max_episode_steps, int) and max_episode_steps == -1:

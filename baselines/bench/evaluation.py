@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
@@ -16,6 +16,7 @@ from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller, Law, controller_of
 from baselines.staged import driving
+from birthsim_env.assembly import Arguments, spelled_out
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
@@ -68,9 +69,11 @@ class Evaluation:
         }
 
 
+@spelled_out("policy_period", "actuation")
 def evaluate(
-    environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True, **arguments: Any
-) -> Evaluation:
+    environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True,
+    **arguments: Unpack[Arguments],
+) -> Evaluation:  # fmt: skip
     """Run ``episodes`` episodes of a registered id under a controller, or a function of measurement and reference, which
     commands at every control period.
 
@@ -85,7 +88,7 @@ def evaluate(
 
 def evaluate_worlds(
     environment: str, controller: Controller | Law, name: str, seeds: Sequence[int], rigs: Array | None, progress: bool = True,
-    **arguments: Any,
+    **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
     result, law, first = Evaluation(name), controller_of(controller), 0
@@ -119,7 +122,7 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
 
 
 def _run_batch(
-    environment: str, controller: Controller, seeds: list[int], rigs: Array | None, arguments: dict[str, Any],
+    environment: str, controller: Controller, seeds: list[int], rigs: Array | None, arguments: Arguments,
     result: Evaluation, spent: list[float], progress: bool,
 ) -> None:  # fmt: skip
     period = load_parameters(arguments.get("parameters")).electronics.control_period

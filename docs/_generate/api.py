@@ -13,7 +13,13 @@ BEYOND = {
         "vector_env.BirthSIMVectorEnv",
         "parts.actuation.Actuation",
     ),
-    "baselines": ("staged.StagedController", "staged.LawStage", "bench.evaluation.table"),
+    "baselines": (
+        "staged.StagedController",
+        "staged.LawStage",
+        "bench.evaluation.table",
+        "rivals.symbolic.symbolic_model",
+        "rivals.symbolic.SymbolicModel",
+    ),
     "agents": (),
 }
 """Package -> names that pages speak of, beside those in its ``__all__``."""
@@ -68,9 +74,10 @@ def _signature(thing: object, bound: bool = False) -> str:
 
 
 def _shown(one: inspect.Parameter, written: dict[str, _Bare]) -> inspect.Parameter:
-    # A default that is an object of ours says more by its class than by its address.
+    # A default that is an object of ours says more by its class than by its address; one that a factory makes has none.
     simple = one.default is one.empty or isinstance(one.default, (bool, int, float, str, tuple, type(None)))
-    default = one.default if simple else _Bare(f"{type(one.default).__name__}(...)")
+    made = type(one.default).__module__ == "dataclasses"
+    default = one.default if simple else _Bare("..." if made else f"{type(one.default).__name__}(...)")
     return one.replace(annotation=written.get(one.name, one.empty), default=default)
 
 
@@ -87,6 +94,8 @@ def _annotations(thing: object) -> dict[str, _Bare]:
             if isinstance(node, ast.FunctionDef) and (not inspect.isclass(one) or node.name == "__init__"):
                 given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
                 found |= {own.arg: _Bare(ast.unparse(own.annotation)) for own in given if own and own.annotation}
+                if packed := re.fullmatch(r"Unpack\[(\w+)\]", found.get(node.args.kwarg.arg, "") if node.args.kwarg else ""):
+                    found |= _annotations(getattr(import_module(one.__module__), packed[1]))
                 found |= {"return": _Bare(ast.unparse(node.returns))} if node.returns else {}
             elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
                 found[node.target.id] = _Bare(ast.unparse(node.annotation))

@@ -7,12 +7,10 @@ import gymnasium
 
 import birthsim_env
 from birthsim_env import observation, reward
-from birthsim_env.assembly import assemble
+from birthsim_env.assembly import DEFAULTS
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-
-LEFT_OUT = ("scenario", "num_envs", "unknown")
 
 
 def environments() -> str:
@@ -91,5 +89,4 @@ def _spaces(name: str) -> dict[str, str]:
 
 def _arguments() -> dict[str, str]:
     """Argument of ``gymnasium.make`` -> its default."""
-    signature = inspect.signature(assemble).parameters.values()
-    return {one.name: repr(one.default) for one in signature if one.name not in LEFT_OUT}
+    return {name: repr(default) for name, default in DEFAULTS.items()}

@@ -1,5 +1,8 @@
 """What users of Gymnasium and control engineers expect to find."""
 
+import inspect
+import re
+
 import gymnasium
 import numpy as np
 import pytest
@@ -8,6 +11,10 @@ from gymnasium.wrappers import TimeAwareObservation
 from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env import Parameters
+from birthsim_env.assembly import DEFAULTS, Arguments
+from birthsim_env.env import BirthSIMEnv
+from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.vector_env import BirthSIMVectorEnv
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -124,3 +131,62 @@ def test_a_window_without_a_display_says_so(monkeypatch):
     with pytest.warns(UserWarning, match="rgb_array"):
         env.reset(seed=0)
     env.close()
+
+
+@pytest.mark.parametrize("kind", [BirthSIMEnv, BirthSIMVectorEnv, evaluate])
+def test_signatures_name_every_argument(kind):
+    """A function of plain Python with these arguments is the oracle of what completion finds."""
+    shown = inspect.signature(kind).parameters
+    inside = {"policy_period", "actuation"} if kind is evaluate else set()
+    assert not any(one.kind is one.VAR_KEYWORD for one in shown.values())
+    assert set(Arguments.__annotations__) == set(DEFAULTS) == (set(shown) & set(DEFAULTS)) | inside
+    assert {name: shown[name].default for name in ("sensors", "duration")} == {"sensors": "ideal", "duration": None}
+    documented = re.findall(r"`(\w+)`", re.search(r"## Arguments\n(.*?)\n\n    Controllers", BirthSIMEnv.__doc__, re.DOTALL)[1])
+    assert set(DEFAULTS) <= set(documented)
+
+
+def test_every_argument_that_is_shown_is_taken():
+    env = single(**DEFAULTS)
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.reset(seed=3)[0], single().reset(seed=3)[0])
+
+
+def test_info_says_what_a_step_costs():
+    """Against the state of the plant, its flows and the parameters, until open valves have driven a piston into its stop."""
+    env = vector(
+        policy_period=0.001, user_force=lambda time: (30.0, -40.0), randomize="plant", autoreset_mode="Disabled"
+    )  # fmt: skip
+    env.reset(seed=3)
+    plant, used, deepest, largest, costs = env.unwrapped.simulation.plant, np.zeros(2), 0.0, 0.0, set()
+    for _ in range(900):
+        *_, terminated, _, info = env.step(np.tile([1.0, -1.0, 1.0, -1.0], (2, 1)))
+        used += np.maximum(plant.mass_flows()[:4], 0.0).sum(axis=0) * 0.001
+        rig = Rig(plant.lane_parameters)
+        depth = np.maximum(abs(plant.piston) - np.stack([rig.half_l1, rig.half_l2]), 0.0)
+        excess = np.maximum(np.maximum(plant.pressures - rig.supply, rig.atmosphere - plant.pressures), 0.0)
+        np.testing.assert_array_equal(info["stop_depth"], depth.T)
+        np.testing.assert_array_equal(info["pressure_excess"], excess.T)
+        np.testing.assert_array_equal(info["cost"], (depth > 0.0).any(axis=0) | (excess > 0.0).any(axis=0))
+        np.testing.assert_allclose(info["hand_force"], 50.0 * (info["time"] > 0.0), rtol=1e-15)
+        np.testing.assert_allclose(info["air_used"], used, rtol=1e-12)
+        deepest, largest, costs = max(deepest, depth.max()), max(largest, excess.max()), costs | {*info["cost"]}
+        if terminated.any():
+            break
+    assert deepest > 0.0
+    assert largest > 0.0
+    assert costs == {0.0, 1.0}
+    assert (env.reset()[1]["air_used"] == 0.0).all()
+
+
+def test_every_superseded_id_names_its_successor():
+    """CONTRIBUTING.md promises it of every version that was."""
+    names = [name for name in gymnasium.registry if name.startswith("BirthSIM/")]
+    older = [(f"{name[: -len(v)]}{k}", name) for name in names for v in [name.rpartition("-v")[2]] for k in range(int(v))]
+    assert ("BirthSIM/Probe-v1", "BirthSIM/Probe-v2") in older
+    for old, new in older:
+        for make in (gymnasium.make, gymnasium.make_vec):
+            with (
+                pytest.warns(DeprecationWarning, match=f"{old} is out of date"),
+                pytest.raises(gymnasium.error.DeprecatedEnv, match=f"use `{new}`"),
+            ):
+                make(old)

@@ -88,6 +88,13 @@ def test_generated_parts_know_everything(parts):
         assert [name for name in names if f"`{name}`" not in parts[part]] == [], part
 
 
+def test_pages_of_the_code_spell_out_arguments_and_defaults(parts):
+    pages = " ".join(parts[f"api_{package}.md"] for package in ("birthsim_env", "baselines", "agents"))
+    assert "HAS_DEFAULT_FACTORY" not in pages
+    assert "**arguments" not in pages
+    assert pages.count("sensors: str = 'ideal', randomize: Randomize = False") == 3
+
+
 def test_every_part_has_its_page(parts):
     included = {Path(file).name for page in PAGES.values() for file in re.findall(r"\{include\} (\S+)", page)}
     assert included == set(parts)

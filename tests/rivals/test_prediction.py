@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from baselines.rivals import horizon
 from baselines.rivals.horizon import FLOWS, FORCES, HALF, NODES, OUTPUTS, POINTS, SIZE, STATE, Horizon, Situation
+from baselines.rivals.symbolic import ALGEBRAS, symbolic_model
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column, parameter_columns
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law, rigid_body
@@ -88,6 +89,35 @@ def test_rates_are_those_of_newton_and_polytropic_chambers(rig: Parameters) -> N
     size = np.abs(expected).max(axis=0)
     assert np.all(size > [0.1, 0.1, 5, 5, 5, 5, 5, 5])
     np.testing.assert_allclose(found.T / UNITS / size, expected / size, rtol=0, atol=1e-9)
+
+
+def numeric(rig: Parameters, algebra: str) -> Any:
+    """The symbolic model as a function of state, flows and forces, in SI units, that returns rates and outputs (14,)."""
+    of = pytest.importorskip(algebra)
+    model = symbolic_model(rig, algebra)
+    symbols = [model.state, model.flow, model.force]
+    if algebra == "sympy":
+        made = of.lambdify([list(one) for one in symbols], [*model.rates, *model.outputs])
+        return lambda *given: np.array(made(*given), dtype=float)
+    made = of.Function("model", symbols, [of.vertcat(model.rates, model.outputs)])
+    return lambda *given: np.array(made(*given))[:, 0]
+
+
+@on_both_rigs
+@pytest.mark.parametrize("algebra", ALGEBRAS)
+def test_symbols_are_the_second_model_too(rig: Parameters, algebra: str) -> None:
+    rng, state = np.random.default_rng(1), states(rig, 5, 0)
+    flows, pushes, found_by = rng.normal(0, 2, (FLOWS, 5)), rng.normal(0, 25, (FORCES, 5)), numeric(rig, algebra)
+    for lane in range(5):
+        now, flow, push = state[:, lane], flows[:, lane], pushes[:, lane]
+        found = found_by(now * UNITS, FLOW * flow, push)
+        np.testing.assert_allclose(found[:8] / UNITS, second_rates(now, flow, *np.split(push, 2), rig), rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(found[8:], seen_from_outside(now, rig), rtol=1e-7, atol=1e-9)
+
+
+def test_an_algebra_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="algebra = 'maple'; allowed: 'sympy', 'casadi'"):
+        symbolic_model(algebra="maple")
 
 
 def about(rig: Parameters, steps: Array, weight: Array) -> Horizon:

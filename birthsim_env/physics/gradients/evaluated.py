@@ -18,16 +18,21 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 """Those of the plant."""
 
 
+def carried_out(graph: Graph, inputs: Mapping[str, Any], operations: Mapping[str, Callable[..., Any]]) -> list[Any]:
+    """What each node of a graph is by these ``operations``, which may be another algebra's; ``inputs`` has rows by block."""
+    found: list[Any] = []
+    for operation, *arguments in graph.nodes:
+        if operation == "input":
+            found.append(inputs[arguments[0]][arguments[1]])
+        else:
+            found.append(operations[operation](*(found[a.at] if isinstance(a, Value) else a for a in arguments)))
+    return found
+
+
 def evaluated(graph: Graph, inputs: Mapping[str, Array], wanted: Sequence[Scalar]) -> Array:
     """The ``wanted`` scalars (R,) at T points, (R, T); ``inputs`` are the blocks that the graph reads, (rows, T)."""
-    numbers: list[Any] = []
     # Both sides of a selection are computed, of which the other one may be no number.
     with np.errstate(all="ignore"):
-        for operation, *arguments in graph.nodes:
-            if operation == "input":
-                numbers.append(inputs[arguments[0]][arguments[1]])
-            else:
-                given = (numbers[a.at] if isinstance(a, Value) else a for a in arguments)
-                numbers.append(OPERATIONS[operation](*given))
+        numbers = carried_out(graph, inputs, OPERATIONS)
     points = next(iter(inputs.values())).shape[1]
     return np.stack([np.broadcast_to(numbers[v.at] if isinstance(v, Value) else v, points) for v in wanted])
