@@ -79,10 +79,9 @@ def _tasks(point: Point, sweep: Sweep) -> list[Task]:
     if asked["controller"] == "residual" or "policy" in asked:
         # Policies need an extra, which laws do not.
         from agents.policy.files import WEIGHTS
-        from agents.policy.seeds import best_policy, policy_folders
+        from agents.policy.seeds import best_policy
 
         name = asked.get("policy") or policy_of(asked["environment"])
-        policy_folders(name)  # which says what is allowed where there is none
         place = best_policy(name)
         own = {
             "controller": "residual", "source": file_hash(str(place / WEIGHTS)), "rig": believed.to_dict(),
