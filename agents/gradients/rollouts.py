@@ -19,6 +19,7 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from torch import Tensor
+from torch.utils.dlpack import from_dlpack
 
 
 class Now(NamedTuple):
@@ -51,7 +52,7 @@ class _Step(torch.autograd.Function):
     @staticmethod
     def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None]:
         carried, action = context.back(*map(context.array, gradients[:5]))
-        return torch.from_dlpack(carried), torch.from_dlpack(action), None
+        return from_dlpack(carried), from_dlpack(action), None
 
 
 class Worlds:
@@ -100,6 +101,6 @@ class Worlds:
 
     def _now(self, observation: Any, reward: Any, ended: Any) -> Now:
         arrays = (observation, reward, *self.recorder.reached(), ended)
-        found = [torch.from_dlpack(array) for array in arrays]
+        found = [from_dlpack(array) for array in arrays]
         carried = torch.zeros((len(self.recorder.carried), self.env.num_envs), dtype=torch.float64, device=found[0].device)
         return Now(carried, *found)
