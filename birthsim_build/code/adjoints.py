@@ -18,8 +18,8 @@ address of a copy of ``program.words``, and two numbers (``tests/build/way_back.
 3. ``advance``: control periods of a policy step, and the address of a tape (``program.tape(periods)``, lanes), or 0 for none.
 4. Write gradients into the bars of the tape: row ``PARAMETERS + recorder.at["reward"]``, or another name or ``carried`` of it;
    those of all other of the ``len(recorder.loop.live)`` rows are zero.
-5. ``backward``: the same numbers as ``advance``. The bars at ``recorder.at["action"]`` are now gradients to the action, those at
-   ``recorder.at["carried"]`` go to the same rows of the tape of the step before.
+5. ``backward``: the same numbers as ``advance``. The bars at ``recorder.at["action"]`` are now gradients to the action, those
+   at ``recorder.at["carried"]`` go to the same rows of the tape of the step before.
 
 Lanes have the bits of ``TapedLoop``. Adjoints know a stage's constants: those of another rig or law are another program's.
 """
