@@ -2,17 +2,26 @@
 
 The code of both is made by one call, for a processor, PTX or WebAssembly alike, and needs nothing from elsewhere:
 
-    recorder = Recorder(simulation)            # of lanes that have begun
+    env.reset(seed=...)                                    # a vector environment whose lanes begin
+    recorder = Recorder(env.unwrapped.simulation)
     recorder.prepare()
-    pieces, like = pieces_of(simulation), pieces_of(the same with another number of lanes)
+    pieces = pieces_of(env.unwrapped.simulation)           # like: those of the same with another number of lanes
     program = program_of(pieces, like, pieces.functions, recorder.loop)
-    compile_object(pieces.functions, "wasm", out, threads=program.threads)    # or building.write_wasm, which links
+    write_wasm(pieces.functions, out, program.threads)     # or compile_object(pieces.functions, target, out, threads=...)
 
-The object has ``birthsim_place``, ``_fill``, ``_advance`` and ``_backward``. After the first two ``birthsim_advance(thread,
-block, width, program, periods, tape)`` runs a lane, and where the address ``tape`` is not 0, writes ``tape`` (words, lanes):
-the rig, room for bars, and what adjoints read, ``program.tape(periods)`` words in all. Gradients to the live rows at the end
-are then written into the bars; ``birthsim_backward`` with the same arguments takes them to the beginning, with the bits of
-``TapedLoop``. Bars of a row of the loop stand in row ``PARAMETERS + recorder.loop.live.index(row)`` of the tape.
+It has ``birthsim_place``, ``_fill``, ``_advance`` and ``_backward``, which are called with thread, block, threads a block, the
+address of a copy of ``program.words``, and two numbers (``tests/build/way_back.mjs`` does it in WebAssembly):
+
+1. ``place`` by one thread: the address of the data (``program.rows``, lanes), and how many lanes there are.
+2. ``fill``: 0, 0; all lanes begin as the first of ``pieces`` does. Or write into the data what each array begins with:
+   ``program.regions`` says where ``pieces.arrays()`` are, the action among them.
+3. ``advance``: control periods of a policy step, and the address of a tape (``program.tape(periods)``, lanes), or 0 for none.
+4. Write gradients into the bars of the tape: row ``PARAMETERS + recorder.at["reward"]``, or another name or ``carried`` of it;
+   those of all other of the ``len(recorder.loop.live)`` rows are zero.
+5. ``backward``: the same numbers as ``advance``. The bars at ``recorder.at["action"]`` are now gradients to the action, those
+   at ``recorder.at["carried"]`` go to the same rows of the tape of the step before.
+
+Lanes have the bits of ``TapedLoop``. Adjoints know a stage's constants: those of another rig or law are another program's.
 """
 
 from birthsim_build.code.advance import words
