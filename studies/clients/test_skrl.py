@@ -71,5 +71,3 @@ def test_ppo_learns_with_clipped_actions(settings, mean_return):
 def test_without_clipping_it_is_told_what_to_choose(settings):
     with pytest.raises(ValueError, match="clip_actions=True"):
         Runner(worlds(), settings).run("train")
-
-
