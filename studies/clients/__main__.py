@@ -37,6 +37,15 @@ CLIENTS = {
     # CleanRL's last release asks for Python below 3.11 and for the old gym, which the file that is run here does not import.
     "cleanrl": Client(extras="[agents]", alone=("cleanrl==1.2.0",)),
     "torchrl": Client(extras="[agents]", needs=("torchrl==0.14.1",)),
+    "skrl": Client(extras="[agents]", needs=("skrl==2.1.1",)),
+    # virtualenv, which pre-commit wants, which Tianshou wants, asks for filelock below 4.
+    "tianshou": Client(extras="[agents]", needs=("tianshou[eval]==2.0.1",), freed=("filelock",)),
+    # d3rlpy pins gymnasium 1.0.0; these are what it imports.
+    "offline": Client(
+        extras="[agents]",
+        needs=("minari[hdf5,create]==0.5.4", "click", "colorama", "dataclasses-json", "gym", "scikit-learn", "structlog"),
+        alone=("d3rlpy==2.8.1",),
+    ),
     "cluster": Client(extras="[cluster]"),
     # Never ray[rllib]: it pins gymnasium 1.2.2. These are what RLlib imports.
     "rllib": Client(
