@@ -21,7 +21,7 @@ from studies.figures import figure
 from studies.results import changed, read_result
 from studies.study import Study
 
-DATA, README = ROOT / "docs" / "data", ROOT / "README.md"
+DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "paper.md")
 ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
 """Texts that do not stand in ``DATA``."""
 
@@ -85,9 +85,10 @@ def rendered() -> dict[Path, str]:
     """Every file that shows results, and what should stand in it."""
     found = {path: text for name in names() for path, text in texts(name)}
     tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
-    readme = README.read_text(encoding="utf-8")
-    readme = _MARKED.sub(lambda mark: f"{mark[1]}{tables[mark[2]]}{mark[4]}", readme)
-    return found | {README: _QUOTED.sub(lambda mark: f"{mark[1]}{figure(mark[2])}{mark[4]}", readme)}
+    for page in PAGES:
+        text = _MARKED.sub(lambda mark: f"{mark[1]}{tables[mark[2]]}{mark[4]}", page.read_text(encoding="utf-8"))
+        found[page] = _QUOTED.sub(lambda mark: f"{mark[1]}{figure(mark[2])}{mark[4]}", text)
+    return found
 
 
 def render() -> None:

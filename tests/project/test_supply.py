@@ -1,12 +1,15 @@
 """Hashes, versions and licences of what the project is made of; the pages and workflows that speak of it."""
 
 import hashlib
+import json
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
+
+import birthsim_env
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 LOCKS = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "requirements").glob("*.txt")}
@@ -62,6 +65,19 @@ def test_every_dependency_of_the_project_is_locked():
     assert names - {plain(name) for name in PINS["project"]} == {"torch", "ray", "cupy-cuda12x", "nvidia-cuda-nvcc-cu12"}
 
 
+def test_the_papers_of_a_release_agree():
+    """CITATION.cff, codemeta.json and the conda recipe with the package; the recipe asks for what pyproject.toml asks for."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    recipe = yaml.safe_load((ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    codemeta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    versions = {citation["version"], codemeta["version"], recipe["context"]["version"]}
+    assert versions == {birthsim_env.__version__}
+    asked = {one.replace(" ", "").replace("-base", "") for one in recipe["requirements"]["run"]}
+    assert asked == {*project["dependencies"], f"python{project['requires-python']}"}
+    assert (codemeta["description"], codemeta["keywords"]) == (project["description"], project["keywords"])
+
+
 def test_what_is_vendored_is_the_published_package():
     folder = ROOT / "birthsim_live" / "page" / "vendor"
     assert {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()} == UPLOT
@@ -71,7 +87,7 @@ def test_what_is_vendored_is_the_published_package():
     assert f"| {version} | MIT" in named
 
 
-@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "SECURITY.md", "THIRD_PARTY.md", "CHANGELOG.md"])
+@pytest.mark.parametrize("page", ["CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "SECURITY.md", "THIRD_PARTY.md", "CHANGELOG.md"])
 def test_what_a_page_names_exists(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     links = [link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link]

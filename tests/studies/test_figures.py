@@ -10,7 +10,7 @@ from studies.results import read_result
 
 QUOTED = sorted({
     (path.relative_to(ROOT).as_posix(), name)
-    for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    for path in [ROOT / "README.md", ROOT / "paper.md", *(ROOT / "docs").rglob("*.md")]
     for pair in re.findall(r"\{figure\}`([^`]+)`|<!-- figure ([^>]+) -->", path.read_text(encoding="utf-8"))
     for name in pair if name
 })  # fmt: skip
