@@ -7,6 +7,7 @@ from birthsim_env.physics.rig.values import near, shown
 
 FORMS: dict[str, tuple[str, str, str, str]] = {
     "onnx": ("agents", "export", "a trained policy, for ONNX runtimes", "circle --out policy.onnx"),
+    "hub": ("agents", "export", "a trained policy with its card, for the Hugging Face Hub", "circle --out out/hub"),
     "minari": ("agents", "dataset", "episodes of a controller, for offline learning", "--level expert --out datasets"),
     "wasm": ("birthsim_build", "build", "closed loops, as WebAssembly with JavaScript", "--out out/wasm"),
     "c": ("birthsim_build", "build", "closed loops, as a library for this processor", "--out out/c"),

@@ -1,5 +1,6 @@
-"""birthsim export: a trained policy as one file for other runtimes."""
+"""birthsim export: a trained policy as one file for other runtimes, or with its card for the Hugging Face Hub."""
 
+import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -7,25 +8,47 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from baselines.commands.settings import Configured
+from birthsim_env.files import make_folder, whole_results
 
 
 @dataclass(kw_only=True)
 class Settings(Configured):
-    """Write a trained policy with its normalisation as one file, checked against PyTorch and NumPy.
+    """Write a trained policy with its normalisation as one ONNX file, checked against PyTorch and NumPy, or as a folder for the
+    Hugging Face Hub, with a card that says where it is better and worse.
 
-    The file says what its inputs and outputs are; examples/onnx_policy.py runs one with the controller at 1 kHz.
+    The ONNX file says what its inputs and outputs are; examples/onnx_policy.py runs one with the controller at 1 kHz.
     """
 
     policy: Annotated[str, Parameter(metavar="DIR")] = field(kw_only=False)
     """Folder that birthsim train wrote, or the name of what is shipped, such as circle; of several seeds the best."""
-    to: Literal["onnx"]
-    """Form of the file."""
+    to: Literal["onnx", "hub"]
+    """Form."""
     out: Path | None = None
-    """File, else policy.onnx in the policy's folder."""
+    """File or folder, else policy.onnx or hub in the policy's folder."""
 
 
 def main(settings: Settings) -> None:
-    """Write the file and say what was compared."""
+    """Write, and say what was compared."""
+    (_write_folder if settings.to == "hub" else _write_file)(settings)
+
+
+def _write_folder(settings: Settings) -> None:
+    from agents.policy.files import WEIGHTS
+    from agents.policy.seeds import best_policy
+    from agents.reports.card import TRAINING, model_card
+
+    folder = best_policy(settings.policy)
+    card = model_card(folder, f"birthsim-{Path(settings.policy).name}")
+    out = make_folder(settings.out or folder / "hub")
+    with whole_results(out) as place:
+        for name in (WEIGHTS, TRAINING):
+            shutil.copyfile(folder / name, place / name)
+        (place / "README.md").write_text(card, encoding="utf-8")
+    print(card)
+    print(f"written to {out}/: README.md, {WEIGHTS}, {TRAINING}; hf upload OWNER/NAME {out} publishes them")
+
+
+def _write_file(settings: Settings) -> None:
     try:
         # PyTorch takes seconds to load; it and the rest come with extras only.
         from agents.policy.files import load_policy
