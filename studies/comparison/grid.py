@@ -21,6 +21,7 @@ from baselines.bench.pieces import controller_settings, file_hash, file_stem
 from baselines.bench.statistics import penalize_lost
 from baselines.registry import LISTED, make_controller
 from baselines.work.tasks import Result, Task
+from birthsim_env.assembly import Arguments
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import drawn_by
@@ -165,7 +166,7 @@ def run_cell(
     parameters = Parameters.from_dict(rig)
     law = make_controller(controller, parameters, **({"policy": SHIPPED / policy} if policy else {}))
     parameters = as_described(parameters) if plant == "described-sensors" else parameters
-    setting = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
+    setting: Arguments = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
     result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)
     if len(result.seeds) < episodes:
         raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a cell is complete or it is none

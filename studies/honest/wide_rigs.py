@@ -11,6 +11,7 @@ from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable, penalize_lost, quantile
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
+from birthsim_env.assembly import Arguments
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import environment_id
@@ -59,7 +60,8 @@ def measure(
     """
     believed = Parameters.from_dict(rig)
     law = make_controller(controller, believed)
-    worlds = {"randomize": {name: tuple(pair) for name, pair in ranges.items()}, "sensors": "honest", "parameters": believed}
+    drawn = {name: tuple(pair) for name, pair in ranges.items()}
+    worlds: Arguments = {"randomize": drawn, "sensors": "honest", "parameters": believed}
     found = evaluate(environment_id(scenario), law, controller, episodes, seed, progress=False, **worlds)
     within = np.asarray(found.required_strength_ratio) <= STRENGTH
     values = {name: np.asarray(values) for name, values in found.metrics.items()}

@@ -8,6 +8,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import NORMAL_DENSITY
 from baselines.bench.statistics import penalize_lost
 from baselines.work.tasks import Result
+from birthsim_env.assembly import Arguments
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.compiled.lanes import Array
@@ -46,7 +47,7 @@ def measure(
 
 def _episodes(condition: Condition, lanes: int) -> dict[str, Any]:
     """Of all scenarios, each of which draws what it asks for: settled errors, and what the push of ``probe`` tells."""
-    worlds = {"sensors": condition.sensors, "randomize": True, "parameters": condition.rig}
+    worlds: Arguments = {"sensors": condition.sensors, "randomize": True, "parameters": condition.rig}
     episodes = {
         name: evaluate(
             environment_id(name), condition.law(), condition.controller, lanes, condition.seed, progress=False, **worlds
