@@ -174,6 +174,7 @@ function forget() {
 function showState(values) {
   if (!values) return;
   rig.state = values;
+  learning.pause(values.paused);
   transport.show(values);
 }
 

@@ -11,7 +11,7 @@ const SMOOTH = 9; // updates of which a median is shown
 export class Learning {
   /** `send` tells the rig what has been learned, `change` asks it for settings, `tell` says what fails. */
   constructor({ send, change, tell }) {
-    Object.assign(this, { send, change, tell, wanted: false, worker: null, share: 0, seconds: 0, errors: [], settings: {} });
+    Object.assign(this, { send, change, tell, wanted: false, paused: false, worker: null, share: 0, seconds: 0, errors: [], settings: {} });
     const [place, button, words, choice, canvas] = ["learning", "learn", "learned", "choose-learned", "learning-curve"].map((id) => document.getElementById(id));
     Object.assign(this, { place, button, words, choice });
     this.sheet = new Sheet(canvas, { changed: () => this.sheet && this.draw() });
@@ -38,9 +38,15 @@ export class Learning {
     this.go();
   }
 
+  /** It rests while the rig does, such as out of sight in a long page. */
+  pause(paused) {
+    this.paused = paused;
+    this.go();
+  }
+
   /** Learn where that is wanted and seen. */
   go() {
-    const on = this.wanted && !this.place.hidden && !document.hidden;
+    const on = this.wanted && !this.paused && !this.place.hidden && !document.hidden;
     if (on) this.worker ??= this.begin();
     this.worker?.postMessage({ on });
     this.write();
