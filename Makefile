@@ -44,10 +44,9 @@ CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nv
 SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
-# Policies by gradients: those with a configuration of their own; scenario, configuration, environment.
+# Policies by gradients: those with a configuration of their own; environments of circle_apg.
 CONFIGURED := probe_apg circle_residual_apg
-BY_GRADIENTS := circle:circle:Circle-v1 descent:circle:Descent-v1 forceps:circle:Forceps-v1 dystocia:vacuum:Dystocia-v1 \
-  vacuum:vacuum:Vacuum-v0
+BY_GRADIENTS := circle:Circle-v1 descent:Descent-v1 forceps:Forceps-v1 dystocia:Dystocia-v1 vacuum:Vacuum-v0
 GRADIENTS := $(foreach one,$(BY_GRADIENTS),$(firstword $(subst :, ,$(one)))_apg) $(CONFIGURED)
 HONEST := circle_honest_apg
 LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
@@ -214,8 +213,8 @@ results: $(READY)
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE) $(CONFIGURED); do \
 	  $(BIN)/birthsim train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; done
-	for one in $(BY_GRADIENTS); do id=$${one##*:}; given=$${one%:*}; $(BIN)/birthsim train --config $${given#*:}_apg \
-	  --env BirthSIM/$${id%-*}Residual-$${id#*-} --seeds 5 --jobs 2 --out $(OUT)/training/$${given%:*}_apg || exit 1; done
+	for one in $(BY_GRADIENTS); do id=$${one#*:}; $(BIN)/birthsim train --config circle_apg \
+	  --env BirthSIM/$${id%-*}Residual-$${id#*-} --seeds 5 --jobs 2 --out $(OUT)/training/$${one%:*}_apg || exit 1; done
 	$(BIN)/birthsim train --config $(HONEST) --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/$(HONEST)
 	$(BIN)/birthsim train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
 	$(BIN)/birthsim distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
@@ -233,8 +232,7 @@ learned: $(READY)
 	cp $(OUT)/studies/learned/learning_curves.png $(OUT)/studies/by-gradients/from_scratch.png docs/
 
 scratch: $(READY)
-	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
-	cp $(OUT)/scratch/scratch.png docs/
+	$(BIN)/python examples/from_scratch.py --out $(OUT)/scratch
 
 targets: $(READY)
 	$(BIN)/birthsim study targets

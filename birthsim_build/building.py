@@ -10,6 +10,7 @@ from birthsim_build.code.compiler import EMULATIONS, compile_object, link
 from birthsim_build.code.elf import sections_of, undefined_in
 from birthsim_build.code.ptx import assemble
 from birthsim_build.code.stack import stack_bytes
+from birthsim_build.code.threads import Threads
 from birthsim_build.device.export import write_programs
 from birthsim_build.estimate import estimates
 from birthsim_build.faces.c import write_example, write_header, write_kernels
@@ -17,7 +18,6 @@ from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
 
-EXPORTS = ("birthsim_advance", "__heap_base")
 STACK = 65536
 """Bytes of stack in WebAssembly; the largest loop takes a tenth."""
 
@@ -27,12 +27,13 @@ Loop = tuple[str, str, str]
 """Scenario, sensors and controller."""
 
 
-def write_wasm(functions: list[str], out: Path) -> None:
-    """Write the code of stages and of what runs them."""
+def write_wasm(functions: list[str], out: Path, threads: Threads | None = None) -> None:
+    """Write the code of stages and of what runs an image of them, or ``threads`` a program."""
     with tempfile.TemporaryDirectory() as place:
         built = Path(place) / "birthsim.o"
-        compile_object(functions, "wasm", built)
-        exported = (f"--export={name}" for name in EXPORTS)
+        compile_object(functions, "wasm", built, threads=threads)
+        runs = threads.runs if threads else ("advance",)
+        exported = ("--export=__heap_base", *(f"--export=birthsim_{name}" for name in runs))
         options = ("--no-entry", "--stack-first", "-z", f"stack-size={STACK}", "--strip-all", *exported)
         link("wasm-ld", *options, "-o", str(out), str(built))
 
@@ -76,7 +77,7 @@ def build_threads(loops: Sequence[Loop], rig: Parameters, seed: int, gpu: str | 
     takes where that is known."""
     functions, space, data = write_programs(loops, rig, seed, folder)
     write_kernels(folder)
-    compile_object(functions, "ptx", folder / "birthsim.o", space=space)
+    compile_object(functions, "ptx", folder / "birthsim.o", threads=Threads(space))
     ptx = folder / "birthsim.ptx"
     report: Report = {"target": "ptx", "code": ptx.stat().st_size, "a lane of": data}
     if gpu is None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_build.layout import FIRST, ROWS
+from birthsim_env.loop.gradients.traced import Adjoint
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import TABLE, Stage
 from birthsim_env.physics.compiled.lanes import Array
@@ -40,8 +41,8 @@ class Part:
     rows: Mapping[int, float]
 
 
-def function_name(stage: Stage) -> str:
-    """Where a stage's function is, as ``module:name``."""
+def function_name(stage: Stage | Adjoint) -> str:
+    """Where the function of a stage, or of its adjoint, is, as ``module:name``."""
     function: Any = getattr(stage.function, "py_func", stage.function)
     return f"{function.__module__}:{function.__qualname__}"
 

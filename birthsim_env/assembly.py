@@ -21,7 +21,7 @@ from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.values import is_within, shown
+from birthsim_env.physics.rig.values import is_within, near, shown
 from birthsim_env.simulation import Simulation
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -89,7 +89,8 @@ ROUNDING = 2.0**-20
 def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
     """``value`` if it is allowed, else a ``ValueError`` that lists what is."""
     if not any(value is option or (isinstance(value, str) and value == option) for option in allowed):
-        raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(repr(option) for option in allowed)}")
+        like = near(value, [option for option in allowed if isinstance(option, str)]) if isinstance(value, str) else ""
+        raise ValueError(f"{name} = {shown(value)}{like}; allowed: {', '.join(repr(option) for option in allowed)}")
     return value
 
 

@@ -16,6 +16,7 @@ from birthsim_env.state import State, give_state, take_state
 
 if TYPE_CHECKING:
     from birthsim_env.drawing.rendering import Renderer
+    from birthsim_env.gradients import Recorder
 
 WINDOW_FRAMES_PER_SECOND = 50
 PATH_POINTS = 160
@@ -107,6 +108,12 @@ class Episodes:
         self._outcome.begin(first)
         episodes = np.concatenate([numbers, np.zeros(missing, dtype=np.int64)])
         self.simulation.begin(first, seeds + [0] * missing, episodes, self._setup.duration, position)
+
+    def record(self) -> "Recorder":
+        """What keeps every policy step from now on, for gradients."""
+        from birthsim_env.gradients import Recorder  # late: it generates code
+
+        return Recorder(self.simulation)
 
     def columns(self, actions: Any) -> Array:
         """Actions (N, size) as columns; ``ValueError`` for what they must not be."""

@@ -14,7 +14,8 @@ from typing import Any, BinaryIO
 _PARTIAL = ".partial"
 """Ending of the hidden names of what is not complete."""
 
-_ENDING = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
+ENDINGS = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
+"""Signals that ask a process to end; Windows has two of them."""
 
 
 def make_folder(path: Path) -> Path:
@@ -95,7 +96,7 @@ def later_signals() -> Iterator[None]:
         yield
         return
     came: list[int] = []
-    before = {ending: signal.signal(ending, lambda number, _: came.append(number)) for ending in _ENDING}
+    before = {ending: signal.signal(ending, lambda number, _: came.append(number)) for ending in ENDINGS}
     try:
         yield
     finally:
@@ -131,7 +132,9 @@ def _partial(path: Path) -> Path:
 
 
 def _is_written(partial: Path) -> bool:
-    """Whether the process that writes a hidden file may still run."""
+    """Whether the process that writes a hidden file may still run; on Windows, which cannot be asked, it may."""
+    if os.name == "nt":
+        return True
     process = partial.name.removesuffix(_PARTIAL).rpartition(".")[2]
     try:
         os.kill(int(process) if process.isdecimal() else os.getpid(), 0)

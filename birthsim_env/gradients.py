@@ -1,6 +1,6 @@
 """A simulation differentiated: what an action did to reward, observation and state some policy steps later.
 
-    recorder = Recorder(env.unwrapped.simulation)    # from now on every step is kept on a tape, with the same bits
+    recorder = env.unwrapped.record()                # from now on every step is kept on a tape, with the same bits
     env.step(actions)
     back = recorder.taken()                          # the pullback of this step
     carried, by_action = back(reward=..., observation=..., carried=...)
@@ -34,12 +34,27 @@ REWARDED, OBSERVED = 0, 3
 Pullback = Callable[..., tuple[Array, Array]]
 
 
+def weigh(
+    bars: Any, at: dict[str, Any], carried: Any = None, reward: Any = None, observation: Any = None, state: Any = None,
+    motion: Any = None,
+) -> None:  # fmt: skip
+    """Add gradients, see ``Recorder.taken``, to the rows ``at`` which their bars (rows, N) stand."""
+    seen = None if observation is None else observation.T
+    given = {"carried": carried, "reward": reward, "observation": seen, "state": state, "motion": motion}
+    for name, gradient in given.items():
+        if gradient is not None:
+            bars[at[name]] += gradient
+
+
 class Recorder:
-    """Runs a simulation in place of its loop, and keeps what going back needs.
+    """Runs a ``simulation`` in place of its loop, and keeps what going back needs.
 
     ``carried`` (C,) are rows of the loop's space, and of tables after it, that hand gradients from one policy step to the one
     before: state, memories, and what is measured. Raises ``ValueError`` that names what cannot be differentiated.
     """
+
+    arrays: Any = np
+    """The module of all arrays."""
 
     def __init__(self, simulation: Simulation) -> None:
         require_plain(simulation.plant)
@@ -49,10 +64,15 @@ class Recorder:
     def run(self, periods: int, threads: int) -> int:
         """The simulation's loop, taped."""
         self.prepare()
-        tape = self._loop.new_tape(periods)
-        missed = self._loop.run_taped(periods, tape, threads)
-        self._last = tape, periods
+        tape = self.loop.new_tape(periods)
+        missed = self.loop.run_taped(periods, tape, threads)
+        # A lane whose episode ends gets another rig before anybody asks for the pullback.
+        self._last = tape, periods, self._simulation.plant.lane_parameters.copy()
         return missed
+
+    def reached(self) -> tuple[Array, Array]:
+        """Motion (4, N) of the end effector and state (18, N) of the plant now."""
+        return self._simulation.motion, self._simulation.plant.state.copy()
 
     def taken(self) -> Pullback:
         """The pullback of the last policy step: ``back(carried=None, reward=None, observation=None, state=None, motion=None)``.
@@ -61,18 +81,11 @@ class Recorder:
         ``reward`` (N,), ``observation`` (N, D), ``state`` (18, N) and ``motion`` (4, N), x, y, vx, vy. It returns those carried
         to the step before, and those to the action (size, N).
         """
-        (tape, periods), rig, loop, at = self._last, self._simulation.plant.lane_parameters.copy(), self._loop, self._at
-        lanes = self._simulation.plant.num_envs
+        (tape, periods, rig), loop, at = self._last, self.loop, self.at
 
-        def back(
-            carried: Array | None = None, reward: Array | None = None, observation: Any = None, state: Array | None = None,
-            motion: Array | None = None,
-        ) -> tuple[Array, Array]:  # fmt: skip
-            bars, seen = np.zeros((len(at["live"]), lanes)), None if observation is None else observation.T
-            given = {"carried": carried, "reward": reward, "observation": seen, "state": state, "motion": motion}
-            for name, gradient in given.items():
-                if gradient is not None:
-                    bars[at[name]] += gradient
+        def back(**given: Any) -> tuple[Array, Array]:
+            bars = np.zeros((len(loop.live), rig.shape[1]))
+            weigh(bars, at, **given)
             loop.back(periods, tape, rig, bars, self._simulation.threads)
             return bars[at["carried"]], bars[at["action"]]
 
@@ -89,7 +102,7 @@ class Recorder:
             raise ValueError(f"{own[0]}, a user's own part, cannot be differentiated; allowed: those of the package")
         named = [(name, one) for name, group in parts.items() for one in group if isinstance(one, Stage)]
         stages, closing = [one for _, one in named], list(simulation.closing)
-        self._loop = loop = TapedLoop(simulation.plant.num_envs, *places, stages, closing)
+        self.loop = loop = TapedLoop(simulation.plant.num_envs, *places, stages, closing)
         free = OF_TIME if simulation.user_force.closed_loop else (*OF_TIME, "hand")
         pieces: list[tuple[int, Stage | Traced]] = []
         for k, (name, stage) in enumerate([*named, *(("closing", one) for one in closing)]):
@@ -117,14 +130,14 @@ class Recorder:
         live = sorted(active & _grown(set(given), [one.feeds for one in reversed(traced)]) | given)
         read = set(ROWS).union(*(one.feeds(set(live)) for one in traced))
         rows["carried"], rows["live"] = [row for row in live if row in read and row not in rows["action"]], live
-        self.carried, self._at = np.array(rows["carried"]), {name: np.searchsorted(live, own) for name, own in rows.items()}
+        self.carried, self.at = np.array(rows["carried"]), {name: np.searchsorted(live, own) for name, own in rows.items()}
         found = []
         for k, piece in pieces:
             one = piece.adjoint(set(live)) if isinstance(piece, Traced) else plant_adjoint(piece)
             if one is not None:
                 one.after = isinstance(piece, Traced) and piece.name == "motion"
                 found.append((k, one))
-        self._loop.differentiate(found, live)
+        self.loop.differentiate(found, live)
 
 
 def _grown(rows: set[int], ways: Sequence[Callable[[set[int]], set[int]]]) -> set[int]:

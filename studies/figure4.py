@@ -16,7 +16,7 @@ def measure(controller: str) -> Result:
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
-    return {name: Task(name, "experiments", measure, {"controller": name}) for name in options.controller}
+    return {name: Task(name, measure, {"controller": name}) for name in options.controller}
 
 
 def _shown(content: Content) -> dict[str, str]:

@@ -34,7 +34,7 @@ def overhead(cluster: str) -> Result:
 
 def _tasks(options: Options) -> dict[Any, Task]:
     pools = {"joblib": "", **({"ray": options.beside} if options.beside else {})}
-    return {name: Task(name, "pools", overhead, {"cluster": cluster}) for name, cluster in pools.items()}
+    return {name: Task(name, overhead, {"cluster": cluster}) for name, cluster in pools.items()}
 
 
 def _shown(content: Content) -> dict[str, str]:

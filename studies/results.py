@@ -16,10 +16,10 @@ LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 ENGINE = (
     "baselines/work/", "baselines/commands/", "baselines/about.py", "birthsim_env/files.py",
-    "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "studies/study.py",
-    "studies/results.py",
+    "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "birthsim_env/drawing/",
+    "baselines/figures/", "studies/study.py", "studies/results.py",
 )  # fmt: skip
-"""What reads options, keeps pieces and describes controllers, and decides no figure: a change of it makes no result stale."""
+"""What reads options, keeps pieces, describes controllers and draws, and decides no figure. It makes no result stale."""
 
 Content = dict[str, Any]
 """What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there
@@ -78,5 +78,5 @@ def _git(*arguments: str) -> str:
 
 def _processor() -> str:
     file = Path("/proc/cpuinfo")
-    lines = file.read_text().splitlines() if file.is_file() else []
+    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
     return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), platform.machine())

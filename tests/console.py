@@ -92,7 +92,7 @@ def interrupted(command, arguments, reached):
     """A command that gets Ctrl-C once ``reached()`` is true: the finished process's status and stdout."""
     line = [sys.executable, "-m", *words(command), *map(str, arguments)]
     # Files hold whatever the command says before anybody reads it; pipes would fill up.
-    with tempfile.TemporaryFile("w+") as stdout, tempfile.TemporaryFile("w+") as stderr:
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as stdout, tempfile.TemporaryFile("w+", encoding="utf-8") as stderr:
         with subprocess.Popen(line, cwd=ROOT, stdout=stdout, stderr=stderr) as process:
             try:
                 until = time.monotonic() + PATIENCE

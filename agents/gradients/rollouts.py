@@ -19,9 +19,7 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from torch import Tensor
-
-from birthsim_env.gradients import Recorder
-from birthsim_env.physics.compiled.lanes import Array
+from torch.utils.dlpack import from_dlpack
 
 
 class Now(NamedTuple):
@@ -46,15 +44,15 @@ class Now(NamedTuple):
 class _Step(torch.autograd.Function):
     @staticmethod
     def forward(context: Any, carried: Tensor, action: Tensor, worlds: Worlds) -> tuple[Tensor, ...]:
-        now = worlds.advance(action.detach().numpy())
-        context.back = worlds.pullback(now)
+        now = worlds.advance(worlds.array(action.detach()))
+        context.back, context.array = worlds.pullback(now), worlds.array
         context.mark_non_differentiable(now.ended)
         return tuple(now)
 
     @staticmethod
     def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None]:
-        carried, action = context.back(*(one.numpy() for one in gradients[:5]))
-        return torch.from_numpy(carried), torch.from_numpy(action), None
+        carried, action = context.back(*map(context.array, gradients[:5]))
+        return from_dlpack(carried), from_dlpack(action), None
 
 
 class Worlds:
@@ -64,7 +62,9 @@ class Worlds:
         if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
             raise ValueError(f"env = {env!r}; allowed: one made with autoreset_mode='SameStep'")
         self.env = env.unwrapped
-        self.recorder = Recorder(self.env.simulation)
+        self.recorder = self.env.record()
+        self.array = self.recorder.arrays.from_dlpack
+        """A tensor as an array of where the lanes are, without a copy."""
 
     def reset(self, seed: Any = None, options: dict[str, Any] | None = None) -> Now:
         """Start all lanes."""
@@ -74,7 +74,8 @@ class Worlds:
     def now(self, observation: Any) -> Now:
         """The lanes as they are, where episodes begin or go on from a state of the environment that was kept."""
         self.recorder.prepare()
-        return self._now(observation, np.zeros(self.env.num_envs), np.ones(self.env.num_envs, dtype=np.bool_))
+        arrays, lanes = self.recorder.arrays, self.env.num_envs
+        return self._now(observation, arrays.zeros(lanes), arrays.ones(lanes, dtype=np.bool_))
 
     def step(self, now: Now, action: Tensor) -> Now:
         """A policy step under actions (N, size) in [-1, 1]."""
@@ -85,11 +86,11 @@ class Worlds:
         observation, reward, terminated, truncated, _ = self.env.step(action)
         return self._now(observation, reward, terminated | truncated)
 
-    def pullback(self, now: Now) -> Callable[..., tuple[Array, Array]]:
+    def pullback(self, now: Now) -> Callable[..., tuple[Any, Any]]:
         """Takes gradients to the arrays of the last step, ``now``, to what was ``carried`` and to the action."""
-        back, lives = self.recorder.taken(), ~now.ended.numpy()
+        back, lives = self.recorder.taken(), ~self.array(now.ended)
 
-        def pull(carried: Array, observation: Array, reward: Array, motion: Array, state: Array) -> tuple[Array, Array]:
+        def pull(carried: Any, observation: Any, reward: Any, motion: Any, state: Any) -> tuple[Any, Any]:
             late, action = back(
                 carried=carried * lives, observation=observation * lives[:, None], reward=reward, motion=motion * lives,
                 state=state * lives,
@@ -99,7 +100,7 @@ class Worlds:
         return pull
 
     def _now(self, observation: Any, reward: Any, ended: Any) -> Now:
-        simulation = self.env.simulation
-        arrays = (observation, reward, simulation.motion, simulation.plant.state.copy(), ended)
-        carried = torch.zeros((len(self.recorder.carried), self.env.num_envs), dtype=torch.float64)
-        return Now(carried, *(torch.from_numpy(np.asarray(array)) for array in arrays))
+        arrays = (observation, reward, *self.recorder.reached(), ended)
+        found = [from_dlpack(array) for array in arrays]
+        carried = torch.zeros((len(self.recorder.carried), self.env.num_envs), dtype=torch.float64, device=found[0].device)
+        return Now(carried, *found)

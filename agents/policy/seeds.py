@@ -51,11 +51,8 @@ def policy_folders(path: str | Path) -> list[Path]:
 
 
 def best_policy(path: str | Path) -> Path:
-    """The policy folder at ``path``, of several seeds the one that did best in validation; ``path`` itself where none is."""
-    try:
-        folders = policy_folders(path)
-    except ValueError:
-        return Path(str(path))
+    """The policy folder at ``path``, of several seeds the one that did best in validation; raises as ``policy_folders``."""
+    folders = policy_folders(path)
     return min(folders, key=_validation_error) if len(folders) > 1 else folders[0]
 
 

@@ -11,7 +11,7 @@ from birthsim_env.assembly import one_of
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.reading import read_toml
-from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, shown
+from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, near, shown
 
 STABLE_BASELINES = ("ppo", "sac", "tqc")
 ALGORITHMS = (*STABLE_BASELINES, "apg")
@@ -140,7 +140,8 @@ def load_configuration(name: str | Path) -> tuple[TrainingSettings, ResidualSett
     path = FOLDER / f"{name}.toml" if str(name) in configuration_names() else Path(name)
     if not path.is_file():
         raise ValueError(
-            f"configuration = {shown(str(name))} is no file; allowed: {', '.join(configuration_names())}, or a TOML file"
+            f"configuration = {shown(str(name))} is no file{near(str(name), configuration_names())}; allowed: "
+            f"{', '.join(configuration_names())}, or a TOML file"
         )
     content = read_toml("configuration", path)
     for table in content:

@@ -52,7 +52,7 @@ def evaluation_tasks(
     hashes = [file_hash(value) for value in world.values() if isinstance(value, str)]
     return [
         Task(
-            f"pieces/{file_stem(label)}/{first}", label, work or evaluate_piece,
+            f"pieces/{file_stem(label)}/{first}", work or evaluate_piece,
             {
                 **settings, "environment": environment, "world": world, "files": hashes, "seed": first,
                 "episodes": min(EPISODES, seed + episodes - first),

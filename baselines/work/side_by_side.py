@@ -17,11 +17,13 @@ from typing import Any
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
+from birthsim_env.files import ENDINGS
+
 Work = Callable[..., Any]
 Pieces = Sequence[tuple[Any, ...]]
 Outcomes = Generator[tuple[int, Any], None, None]
 
-_PARENTS = (signal.SIGINT, signal.SIGHUP)
+_PARENTS = [ending for ending in ENDINGS if ending != signal.SIGTERM]
 """Signals that reach a whole process group, and that the parent answers for its workers."""
 
 CONNECTING = 10.0
@@ -90,12 +92,14 @@ def _unheard(quiet: bool = False) -> Iterator[None]:
 
     A worker imports for seconds, in which Ctrl-C would make it complain; joblib's tracker of semaphores would die of SIGHUP.
     """
-    mask, warned = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS), os.environ.get("PYTHONWARNINGS")
+    masks, warned = getattr(signal, "pthread_sigmask", None), os.environ.get("PYTHONWARNINGS")  # Windows has no masks
+    mask = masks and masks(signal.SIG_BLOCK, _PARENTS)
     os.environ |= {"PYTHONWARNINGS": "ignore"} if quiet else {}
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if masks:
+            masks(signal.SIG_SETMASK, mask)
         os.environ.pop("PYTHONWARNINGS", None)
         os.environ |= {} if warned is None else {"PYTHONWARNINGS": warned}
 

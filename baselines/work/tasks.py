@@ -3,7 +3,6 @@
 import hashlib
 import json
 import platform
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -25,12 +24,11 @@ Result = dict[str, Any]
 class Task:
     """One piece: ``work(**settings)`` of a module's function gives its result; settings and result are JSON.
 
-    ``name`` begins the name of its file below the folder; ``group`` is what the screen counts it under. Where it ``keeps``
-    something between kills, ``work`` gets a folder of its own for that, ``place``, which is no part of the settings.
+    ``name`` begins the name of its file below the folder. Where it ``keeps`` something between kills, ``work`` gets a folder of
+    its own for that, ``place``, which is no part of the settings.
     """
 
     name: str
-    group: str
     work: Callable[..., Result]
     settings: dict[str, Any]
     keeps: bool = False
@@ -65,7 +63,11 @@ def run_tasks(
     results = {name: result for name, path in paths.items() if (result := _read(path)) is not None}
     missing = [task for task in tasks if task.name not in results]
     failures: dict[str, str] = {}
-    _say_what_is_there(title, tasks, results, folder)
+    stale = sum(any(paths[task.name].parent.glob(f"{paths[task.name].stem[:-16]}{'?' * 16}.json")) for task in missing)
+    if results:
+        print(f"{title}: {len(results)} of {len(tasks)} are there with these settings, rig and code, and are kept")
+    if stale:
+        print(f"{title}: {stale} are there with other settings, rig or code, and are computed anew")
     with tqdm(total=len(tasks), initial=len(results), desc=title, unit="piece", disable=not missing) as bar:
 
         def take(number: int, outcome: Result | str) -> None:
@@ -87,17 +89,6 @@ def run_tasks(
             print(f"{title}: {len(results)} of {len(tasks)} are complete and kept; the same command goes on")
             raise
     return {task.name: results[task.name] for task in tasks if task.name in results}, failures
-
-
-def _say_what_is_there(title: str, tasks: Sequence[Task], results: dict[str, Result], folder: Path) -> None:
-    if results:
-        counts = Counter(task.group for task in tasks if task.name in results)
-        listed = ", ".join(f"{group} {count}" for group, count in counts.items())
-        print(f"{title}: {len(results)} of {len(tasks)} are there with these settings, rig and code, and are kept: {listed}")
-    missing = [task.name for task in tasks if task.name not in results]
-    stale = sum(any((folder / name).parent.glob(f"{Path(name).name}-{'?' * 16}.json")) for name in missing)
-    if stale:
-        print(f"{title}: {stale} are there with other settings, rig or code, and are computed anew")
 
 
 def _write(path: Path, task: Task, result: Result) -> None:

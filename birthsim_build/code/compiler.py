@@ -18,9 +18,11 @@ import numba
 import numpy as np
 from llvmlite.binding import llvm_version_info
 
+from birthsim_build.code.threads import Threads
 from birthsim_build.image import Words
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.sources import source_stamp
+from birthsim_env.physics.gradients.source import TEXTS
 
 ONE_LANE = {
     **{"BIRTHSIM_BLOCK": "1", "NUMBA_LOOP_VECTORIZE": "0", "NUMBA_SLP_VECTORIZE": "0"},
@@ -39,15 +41,16 @@ EMULATIONS = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}
 
 def compile_object(
     functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False,
-    space: int = 0,
+    threads: Threads | None = None,
 ) -> None:  # fmt: skip
     """Write the object file ``out`` of stages (``module:name``), ``birthsim_advance`` and constant arrays of words.
 
     For a Cortex-M7 the assembly stands beside it, ``.s``; for PTX the text, ``.ptx``, stands in its place. Where it is to
-    ``count``, the code counts its operations. With ``space``, rows of a lane's memory, threads run lanes. Objects are
-    kept beside the kernels' machine code: the same one of the same sources is not compiled twice.
+    ``count``, the code counts its operations. Where there are ``threads``, they run lanes. Objects are kept
+    beside the kernels' machine code: the same one of the same sources is not compiled twice.
     """
-    request = {"functions": list(functions), "target": target, "count": count, "space": space}
+    request = {"functions": list(functions), "target": target, "count": count, "threads": threads}
+    request["generated"] = [TEXTS[name] for name in _modules(request) if name in TEXTS]
     arrays = dict(data or {})
     place = _place(request, arrays)
     content = place and kept(place)
@@ -76,7 +79,7 @@ def _place(request: dict[str, Any], arrays: dict[str, Words]) -> Path | None:
     folder = cache_folder()
     if folder is None:
         return None
-    modules = dict.fromkeys(["birthsim_build.code.emit", __name__, *(name.partition(":")[0] for name in request["functions"])])
+    modules = "birthsim_build.code.emit", __name__, *_modules(request)
     files = [import_module(module).__file__ for module in modules]
     sources = hashlib.sha256("".join(source_stamp(Path(str(file))) for file in files).encode())
     for name, words in arrays.items():
@@ -84,6 +87,12 @@ def _place(request: dict[str, Any], arrays: dict[str, Words]) -> Path | None:
     versions = (numba.__version__, llvmlite.__version__, llvm_version_info, sys.implementation.cache_tag)
     kind = hashlib.sha256(repr((request, versions)).encode()).hexdigest()
     return folder / f"birthsim_build.{request['target']}-{kind[:16]}-{sources.hexdigest()[:16]}.objects"
+
+
+def _modules(request: dict[str, Any]) -> list[str]:
+    """Modules of stages and adjoints."""
+    adjoints = request["threads"].adjoints if request["threads"] else ()
+    return sorted({name.partition(":")[0] for name in (*request["functions"], *adjoints)})
 
 
 def has_linker() -> bool:

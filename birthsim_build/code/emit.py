@@ -3,7 +3,7 @@
     python -m birthsim_build.code.emit <REQUEST.json
 
 The request names functions (``module:name``), the target, data (an NPZ file of words by name), the object file, whether the
-code counts its operations, and the rows of a lane's memory where threads run lanes (``code.threads``); else they are 0.
+code counts its operations, what ``Threads`` has where threads run lanes, and the source of generated modules.
 """
 
 import json
@@ -16,12 +16,14 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
+from birthsim_build.code.adjoints import backward
 from birthsim_build.code.advance import advance_code
 from birthsim_build.code.counting import counted
 from birthsim_build.code.targets import TARGETS, Target
-from birthsim_build.code.threads import RUNS, threads_code
+from birthsim_build.code.threads import BACK, Threads, threads_code
 from birthsim_env.loop.stage import compiled
 from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.gradients.source import module_of
 
 EXPORTED = "birthsim_"
 
@@ -32,13 +34,16 @@ def main() -> None:
     if BLOCK != 1:
         raise RuntimeError(f"BIRTHSIM_BLOCK = {BLOCK}; allowed: 1")
     place, out = Path(request["data"]), Path(request["out"])
-    emit(request["functions"], TARGETS[request["target"]], place, out, request["count"], request["space"])
+    for text in request["generated"]:
+        module_of(text)
+    threads = request["threads"] and Threads(*request["threads"])
+    emit(request["functions"], TARGETS[request["target"]], place, out, request["count"], threads)
 
 
-def emit(functions: list[str], target: Target, data: Path, out: Path, count: bool, space: int) -> None:
+def emit(functions: list[str], target: Target, data: Path, out: Path, count: bool, threads: Threads | None) -> None:
     """Write the object of ``functions`` with what runs them and the constants of ``data``; for PTX, its text.
 
-    Where it is to ``count``, the code counts its operations. ``space`` as in the request.
+    Where it is to ``count``, the code counts its operations; where there are ``threads``, they run lanes.
     """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
@@ -47,14 +52,15 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
         cpu=target.processor, features=target.features, opt=3, reloc=target.reloc, codemodel="default"
     )
     head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
-    kernels = [_kernel_code(function) for function in functions]
-    stages, on_device = [own for own, _ in kernels], target.triple.startswith("nvptx")
-    if space:
-        runs = [_kernel_code(f"{threads_code.__module__}:{name}") for name in RUNS]
-        entry = threads_code(stages, [own for own, _ in runs], space, on_device)
+    kernels = [_kernel_code(function) for function in (*functions, *(threads.adjoints if threads else ()))]
+    symbols, on_device = [own for own, _ in kernels], target.triple.startswith("nvptx")
+    if threads:
+        modules = {BACK: backward.__module__}
+        runs = [_kernel_code(f"{modules.get(name, threads_code.__module__)}:{name}") for name in threads.runs]
+        entry = threads_code(threads, symbols, [own for own, _ in runs], on_device)
     else:
         runs = [_kernel_code(f"{advance_code.__module__}:advance")]
-        entry = advance_code(stages, runs[0][0])
+        entry = advance_code(symbols, runs[0][0])
     module = llvm.parse_assembly(head + entry + _constants(data))
     for _, code in [*runs, *kernels]:
         module.link_in(llvm.parse_assembly(head + code))

@@ -4,11 +4,13 @@ A graphics processor lays out the memory of neighbouring threads word by word si
 their lanes: what 32 threads read or write at once lies together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from birthsim_build.code.advance import words, wrapper
+from birthsim_build.code.tape import begin_tape, keep
 from birthsim_env.loop.loop import load_rows, store_rows
 from birthsim_env.loop.rows import WORLD
 from birthsim_env.loop.stage import call, carray, pointer
@@ -18,10 +20,10 @@ MAGIC = 0x31_73_64_61_65_72_68_74
 """First word of a program: the version of this format, "threads1"."""
 
 HEAD = 12
-FORMAT, WORDS, LANES, DATA, ROWS, SPACE, MISSED, MOVES, STAGES, FILLS, RELOCATIONS = range(11)
+FORMAT, WORDS, LANES, DATA, ROWS, SPACE, MISSED, MOVES, STAGES, FILLS, RELOCATIONS, WAY_BACK = range(HEAD)
 """Words of a program's head: ``MAGIC``; its words in all; lanes, and the address of their data; words of data of a lane, and
-rows of its memory in a period; how often a stage could not serve a lane; and how many of each of these follow, in this order:
-"""
+rows of its memory in a period; how often a stage could not serve a lane; and how many of each of these follow, in this
+order; and the word at which the way back is described (``tape``), 0 where there is none."""
 
 MOVE, STAGE, FILL, RELOCATION = 4, 6, 4, 3
 """Words of each. A move: address of an array (rows, lanes), its rows, the first row of a lane's memory, whether it is written.
@@ -68,8 +70,10 @@ def fill(program: int, lane: int, unused: int, also_unused: int) -> int:
 
 
 @kernel
-def advance(program: int, lane: int, periods: int, unused: int, space: int, dispatch: int) -> int:
+def advance(program: int, lane: int, periods: int, tape: int, space: int, dispatch: int) -> int:
     """Run control periods of a lane, with its memory at the address ``space``; how often a stage could not serve it.
+
+    Where the address ``tape`` is not 0, what adjoints read is kept there.
 
     ``dispatch`` is the address of what calls a stage by its number.
     """
@@ -80,12 +84,19 @@ def advance(program: int, lane: int, periods: int, unused: int, space: int, disp
     moves = carray(pointer(program + 8 * HEAD, np.int64), (head[MOVES], MOVE))
     rows, first = carray(pointer(space, np.float64), (head[SPACE], 1)), program + 8 * (HEAD + MOVE * head[MOVES])
     load_rows(moves, lanes, lane, 1, rows)
+    about, kept = program + 8 * head[WAY_BACK], 0
+    if tape:
+        kept = begin_tape(about, tape, lanes, lane, rows)
     for period in range(periods):
         for s in range(stages):
             number, closes, sees, memory, constants, tables = words(first + 8 * STAGE * s, STAGE)
             if closes == 0 or period == periods - 1:
                 own, world = space + 8 * memory, space if sees else 0
+                if tape:
+                    kept = keep(program, about, head[DATA], tape, lanes, lane, rows, s, 0, kept)
                 missed += call(dispatch, number, world, space + 8 * WORLD, own, constants, tables, lane)
+                if tape:
+                    kept = keep(program, about, head[DATA], tape, lanes, lane, rows, s, 1, kept)
     store_rows(moves, lanes, lane, 1, rows)
     return missed
 
@@ -93,35 +104,60 @@ def advance(program: int, lane: int, periods: int, unused: int, space: int, disp
 RUNS = ("place", "fill", "advance")
 """What a device is asked to run, each with the address of a program and two whole numbers."""
 
+BACK = "backward"
+"""What it is asked to run besides where there are adjoints, ``code.adjoints.backward``."""
 
-def threads_code(stages: Sequence[str], kernels: Sequence[str], space: int, device: bool) -> str:
-    """LLVM code of ``birthsim_place``, ``birthsim_fill`` and ``birthsim_advance``.
 
-    ``stages`` and ``kernels`` are the symbols of the stages and of ``RUNS``; a lane's memory has room for ``space`` rows. On a
-    ``device`` these are kernels, which know their thread; elsewhere functions that are told it: thread, block, threads a block.
+class Threads(NamedTuple):
+    """What code needs besides stages where threads run lanes: rows of a lane's memory; for the way back, functions of adjoints
+    (``module:name``) and the rows that they need."""
+
+    space: int
+    adjoints: Sequence[str] = ()
+    back_space: int = 0
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of what a device is asked to run."""
+        return (*RUNS, BACK) if self.adjoints else RUNS
+
+
+def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str], device: bool) -> str:
+    """LLVM code of ``birthsim_place`` and all other ``Threads.runs``.
+
+    ``symbols`` are those of the stages and then of the adjoints, ``kernels`` those of what is run. On a ``device`` these are
+    kernels, which know their thread; elsewhere functions that are told it: thread, block, threads a block.
     """
-    numbers = range(len(stages))
-    wrappers = "\n".join(wrapper(k, symbol, "i64 %lane") for k, symbol in enumerate(stages))
+    wrappers = "\n".join(wrapper(k, symbol, "i64 %lane") for k, symbol in enumerate(symbols))
+    stages, rooms = len(symbols) - len(threads.adjoints), {RUNS[-1]: threads.space, BACK: threads.back_space}
+    entries = "".join(_entry(name, symbol, rooms.get(name, 0)) for name, symbol in zip(threads.runs, kernels, strict=True))
+    return f"""
+{wrappers}
+{_dispatch(RUNS[-1], range(stages))}
+{_dispatch(BACK, range(stages, len(symbols)))}
+{entries}
+{_kernels(threads.runs) if device else _functions(threads.runs)}"""
+
+
+def _dispatch(name: str, numbers: Iterable[int]) -> str:
+    """What calls a stage, or an adjoint, by its number."""
     cases = " ".join(f"i64 {k}, label %case{k}" for k in numbers)
     given = ", ".join(f"i64 %{k}" for k in range(1, 6))
     calls = "\n".join(f"case{k}:\n  %m{k} = call i64 @birthsim_stage_{k}({given}, i64 %lane)\n  ret i64 %m{k}" for k in numbers)
     return f"""
-{wrappers}
-define internal i64 @dispatch(i64 %0, {given}, i64 %lane) nounwind {{
+define internal i64 @{name}_one(i64 %0, {given}, i64 %lane) nounwind {{
   switch i64 %0, label %none [ {cases} ]
 {calls}
 none:
   ret i64 1
-}}
-{"".join(_entry(name, symbol, space) for name, symbol in zip(RUNS, kernels, strict=True))}
-{_KERNELS if device else _FUNCTIONS}"""
+}}"""
 
 
 def _entry(name: str, symbol: str, space: int) -> str:
     """What a thread does: the same code on a device and elsewhere."""
     more, types, room = "", "", ""
-    if name == "advance":
-        more, types = ", i64 %space, i64 ptrtoint (ptr @dispatch to i64)", ", i64, i64"
+    if space:
+        more, types = f", i64 %space, i64 ptrtoint (ptr @{name}_one to i64)", ", i64, i64"
         room = f"  %rows = alloca [{space} x double], align 8\n  %space = ptrtoint ptr %rows to i64\n"
     return f"""
 declare i32 @"{symbol}"(ptr, ptr, i64, i64, i64, i64{types})
@@ -145,26 +181,29 @@ end:
 }}"""
 
 
-_FUNCTIONS = "".join(
-    f"""
+def _functions(names: Iterable[str]) -> str:
+    return "".join(
+        f"""
 define void @birthsim_{name}(i64 %thread, i64 %block, i64 %width, ptr %program, i64 %one, i64 %two) nounwind {{
   call void @{name}(i64 %thread, i64 %block, i64 %width, ptr %program, i64 %one, i64 %two)
   ret void
 }}"""
-    for name in RUNS
-)
-
-_PLACES = {"thread": "tid", "block": "ctaid", "width": "ntid"}
-_KERNELS = "".join(f"\ndeclare i32 @llvm.nvvm.read.ptx.sreg.{place}.x()" for place in _PLACES.values()) + "".join(
-    f"""
-define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind {{
-"""
-    + "".join(
-        f"  %{one} = call i32 @llvm.nvvm.read.ptx.sreg.{place}.x()\n  %{one}64 = zext i32 %{one} to i64\n"
-        for one, place in _PLACES.items()
+        for name in names
     )
-    + f"""  call void @{name}(i64 %thread64, i64 %block64, i64 %width64, ptr %program, i64 %one, i64 %two)
+
+
+def _kernels(names: Iterable[str]) -> str:
+    places = {"thread": "tid", "block": "ctaid", "width": "ntid"}
+    declared = "".join(f"\ndeclare i32 @llvm.nvvm.read.ptx.sreg.{place}.x()" for place in places.values())
+    known = "".join(
+        f"  %{one} = call i32 @llvm.nvvm.read.ptx.sreg.{place}.x()\n  %{one}64 = zext i32 %{one} to i64\n"
+        for one, place in places.items()
+    )
+    return declared + "".join(
+        f"""
+define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind {{
+{known}  call void @{name}(i64 %thread64, i64 %block64, i64 %width64, ptr %program, i64 %one, i64 %two)
   ret void
 }}"""
-    for name in RUNS
-)
+        for name in names
+    )

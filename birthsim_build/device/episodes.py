@@ -6,10 +6,11 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_build.device.gradients import DeviceRecorder
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.machine import machine_named
-from birthsim_build.device.program import key_of
+from birthsim_build.device.program import Pieces, key_of
 from birthsim_env.assembly import Setup, checked_actions
 from birthsim_env.episodes import Episodes, start_of
 from birthsim_env.loop.signals import Measurement, Reference
@@ -35,6 +36,7 @@ class DeviceEpisodes(Episodes):
         self._like = Episodes(assembled(1 if self._together > 1 else 2))
         self.elapsed, self._numbers = self.arrays.zeros(lanes, dtype=np.int64), np.full(lanes, -1)
         self._lanes: Lanes | None = None
+        self._recorder: DeviceRecorder | None = None
         self._shapes: list[tuple[int, ...]] = []
         self._places: dict[tuple[int, int], int] = {}
         self._sent: tuple[NDArray[np.intp], Any, list[Any]] | None = None
@@ -58,13 +60,9 @@ class DeviceEpisodes(Episodes):
         arrays, there = pieces.arrays(), self.arrays.asarray(block)
         shapes = [array.shape for array in arrays]
         if self._lanes is None or shapes != self._shapes:
-            self._like.begin_first(self._seeds[:1], self._numbers[:1])
-            before, self._lanes = self._lanes, Lanes(self._machine, pieces, pieces_of(self._like.simulation), self._count)
-            # A table may have got room for more; what it had stands first.
-            for view, old in zip(self._lanes.views, before.views if before else (), strict=False):
-                if old is not None:
-                    view[tuple(map(slice, old.shape))] = old
+            self._make(pieces)
             self._shapes = shapes
+        assert self._lanes is not None, "made above"
         self._places = {key_of(array): k for k, array in enumerate(arrays)}
         columns = [
             region and self.arrays.array(array[region.at(slice(len(block)))])
@@ -72,6 +70,25 @@ class DeviceEpisodes(Episodes):
         ]
         self._sent = block, there, columns
         self._write(there, columns)
+
+    def _make(self, pieces: Pieces) -> None:
+        """Make the lanes anew, with what they had."""
+        self._like.begin_first(self._seeds[:1], self._numbers[:1])
+        like, taped = pieces_of(self._like.simulation), None
+        if self._recorder is not None:
+            self._recorder.prepare()
+            taped = self._recorder.loop
+        before, self._lanes = self._lanes, Lanes(self._machine, pieces, like, self._count, taped)
+        # A table may have got room for more; what it had stands first.
+        for view, old in zip(self._lanes.views, before.views if before else (), strict=False):
+            if old is not None:
+                view[tuple(map(slice, old.shape))] = old
+
+    def record(self) -> DeviceRecorder:
+        self._recorder = DeviceRecorder(self)
+        if self._lanes is not None:
+            self._make(pieces_of(self.simulation))
+        return self._recorder
 
     def _write(self, there: Any, columns: list[Any]) -> None:
         """Put what lanes begin with into their data."""
@@ -98,7 +115,8 @@ class DeviceEpisodes(Episodes):
         if self.action_size:
             self.there(self.simulation.action)[...] = actions
         self.there(self.simulation.impacts)[...] = 0.0
-        if self._lanes.advance(self.simulation.periods):
+        recorder, lanes = self._recorder, self._lanes
+        if recorder.advance(lanes) if recorder else lanes.advance(self.simulation.periods):
             self._setup.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
         self.elapsed += 1
         return self.there(self._outcome.terms).copy(), self.there(self._outcome.ends)[0] > 0.0

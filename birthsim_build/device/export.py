@@ -37,7 +37,7 @@ def write_programs(
         program.words.tofile(folder / f"{name}.bin")
         about = {"words_of_data": program.rows, "periods": episodes.simulation.periods}
         write_json(folder / f"{name}.json", {**about, "rows": rows_of(episodes, pieces, program)})
-        space, data[name] = max(space, program.space), 8 * program.rows
+        space, data[name] = max(space, program.threads.space), 8 * program.rows
     return functions, space, data
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from birthsim_build.code.compiler import compile_object, require_llvm
 from birthsim_build.code.targets import HOST
-from birthsim_build.code.threads import RUNS
+from birthsim_build.code.threads import Threads
 from birthsim_env.physics.rig.values import shown
 
 WIDTH = 32
@@ -27,7 +27,7 @@ ROOM = 64
 """Rows of a thread's memory come in so many, so that loops with the same stages share their code."""
 
 Run = Callable[..., None]
-"""What runs one of ``RUNS``: called with its name, the number of threads, the address of a program and two whole numbers."""
+"""Runs one of ``Threads.runs``: called with its name, how many threads, the address of a program and two whole numbers."""
 
 
 class Machine(Protocol):
@@ -41,8 +41,8 @@ class Machine(Protocol):
     def local(self, array: Any) -> NDArray[Any]:
         """An array as one of NumPy's."""
 
-    def load(self, functions: tuple[str, ...], space: int) -> Run:
-        """Code of stages for threads with so many rows of memory."""
+    def load(self, functions: tuple[str, ...], threads: Threads) -> Run:
+        """Code of stages for threads."""
 
 
 class Host:
@@ -60,14 +60,15 @@ class Host:
     def local(self, array: Any) -> NDArray[Any]:
         return np.asarray(array)
 
-    def load(self, functions: tuple[str, ...], space: int) -> Run:
-        engine = _engine(functions, space)
+    def load(self, functions: tuple[str, ...], threads: Threads) -> Run:
+        engine = _engine(functions, threads)
         types = (*(ctypes.c_int64 for _ in range(3)), ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
-        entries = {name: ctypes.CFUNCTYPE(None, *types)(engine.get_function_address(f"birthsim_{name}")) for name in RUNS}
+        place, own = engine.get_function_address, ctypes.CFUNCTYPE(None, *types)
+        entries = {name: own(place(f"birthsim_{name}")) for name in threads.runs}
 
-        def run(name: str, threads: int, program: int, one: int, two: int) -> None:
+        def run(name: str, count: int, program: int, one: int, two: int) -> None:
             entry = entries[name]
-            for block in range(-(-threads // WIDTH)):
+            for block in range(-(-count // WIDTH)):
                 for thread in range(WIDTH):
                     entry(thread, block, WIDTH, program, one, two)
 
@@ -75,22 +76,23 @@ class Host:
 
 
 @cache
-def _engine(functions: tuple[str, ...], space: int) -> Any:
+def _engine(functions: tuple[str, ...], threads: Threads) -> Any:
     """The code in this process, for good: whoever has an address in it may use it."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-    engine.add_object_file(llvm.ObjectFileRef.from_data(_compiled(functions, str(HOST), space, ".o")))
+    engine.add_object_file(llvm.ObjectFileRef.from_data(_compiled(functions, str(HOST), threads, ".o")))
     engine.finalize_object()
     return engine
 
 
-def _compiled(functions: tuple[str, ...], target: str, space: int, ending: str) -> bytes:
+def _compiled(functions: tuple[str, ...], target: str, threads: Threads, ending: str) -> bytes:
     require_llvm()
+    space, back = (-(-rows // ROOM) * ROOM for rows in (threads.space, threads.back_space))
     with TemporaryDirectory() as folder:
         out = Path(folder) / "code.o"
-        compile_object(functions, target, out, space=-(-space // ROOM) * ROOM)
+        compile_object(functions, target, out, threads=threads._replace(space=space, back_space=back))
         return out.with_suffix(ending).read_bytes()
 
 
@@ -113,17 +115,17 @@ class Cuda:
     def local(self, array: Any) -> NDArray[Any]:
         return np.asarray(self.arrays.asnumpy(array))
 
-    def load(self, functions: tuple[str, ...], space: int) -> Run:
+    def load(self, functions: tuple[str, ...], threads: Threads) -> Run:
         with TemporaryDirectory() as folder:
             path = Path(folder) / "code.ptx"
-            path.write_bytes(_compiled(functions, "ptx", space, ".ptx"))
+            path.write_bytes(_compiled(functions, "ptx", threads, ".ptx"))
             module = self.arrays.RawModule(path=str(path))
-            entries = {name: module.get_function(f"birthsim_{name}") for name in RUNS}
+            entries = {name: module.get_function(f"birthsim_{name}") for name in threads.runs}
             for entry in entries.values():
                 entry.compile()  # else the file is read at the first call
 
-        def run(name: str, threads: int, *arguments: int) -> None:
-            entries[name]((-(-threads // WIDTH),), (WIDTH,), tuple(map(np.int64, arguments)))
+        def run(name: str, count: int, *arguments: int) -> None:
+            entries[name]((-(-count // WIDTH),), (WIDTH,), tuple(map(np.int64, arguments)))
 
         return run
 

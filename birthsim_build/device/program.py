@@ -12,11 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_build.code.threads import COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, RELOCATION, STAGE
+from birthsim_build.code.tape import ABOUT, CLOSING, LIVE, OPEN
+from birthsim_build.code.threads import COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, RELOCATION, STAGE, Threads
 from birthsim_build.image import Words, function_name
+from birthsim_env.loop.gradients.taped import TapedLoop
 from birthsim_env.loop.loop import Place
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import TABLE, Stage
+from birthsim_env.physics.compiled.lanes import PARAMETERS
 
 HALF = 4
 """Bytes of the numbers in which a lane's beginning is written: all arrays consist of them."""
@@ -86,12 +89,17 @@ def key_of(array: NDArray[Any]) -> Key:
 @dataclass(frozen=True)
 class Program:
     """``words`` of a program that has not been placed; ``regions`` of arrays, in the order of ``Pieces.arrays``; ``rows`` of
-    data that a lane has, and ``space``, the rows that it takes in a thread."""
+    data that a lane has, and the ``threads`` that run it; and ``about`` the way back, the first words of its description."""
 
     words: Words
     regions: tuple[Region | None, ...]
     rows: int
-    space: int
+    threads: Threads
+    about: tuple[int, ...]
+
+    def tape(self, periods: int) -> int:
+        """Words of a lane's tape of ``periods`` control periods, the last one with what closes it."""
+        return PARAMETERS + self.about[LIVE] + periods * self.about[OPEN] + self.about[CLOSING]
 
 
 def _regions(many: Pieces, other: Pieces) -> list[Region | None]:
@@ -156,10 +164,34 @@ def _moves(loop: Pieces) -> tuple[list[Place], dict[int, int], int]:
     return [(array, row) for array, row in moves if array.size], memories, rows
 
 
-def program_of(many: Pieces, other: Pieces, functions: Sequence[str]) -> Program:
+def _way_back(
+    taped: TapedLoop, writer: _Writer, regions: Mapping[Key, Region], before: int
+) -> tuple[int, tuple[str, ...], int, tuple[int, ...]]:
+    """The word at which the way back is described, its functions, the rows that it takes in a thread, and ``Program.about``.
+
+    ``before`` functions stand before its own in the code."""
+    names, at = sorted({function_name(one) for _, one in taped.adjoints}), {row: k for k, row in enumerate(taped.live)}
+    kept, entries, sizes = [], [], [0, 0]
+    for s, one in taped.adjoints:
+        found = [taped.sources[row] for row in one.reads]
+        reads = [(0, row) if table is None else (1, regions[key_of(table)].first + row) for table, row in found]
+        kept.append((s, int(one.after), writer.put(np.array(reads, dtype=np.int64)), len(reads)))
+        constants = 0 if one.constants is None else writer.put(one.constants)
+        rows = writer.put(np.array([at[row] for row in one.rows], dtype=np.int64))
+        closes = int(s >= taped.opened)
+        number = before + names.index(function_name(one))
+        entries.append((number, constants, len(reads), rows, len(one.rows), closes))
+        sizes[closes] += len(reads)
+    about = len(taped.live), len(kept), len(entries), *sizes, *taped.most
+    space = PARAMETERS + len(taped.live) + sum(taped.most) + max(len(one.reads) for _, one in taped.adjoints)
+    return writer.put(np.array([*about, *np.ravel(kept), *np.ravel(entries)], dtype=np.int64)), tuple(names), space, about
+
+
+def program_of(many: Pieces, other: Pieces, functions: Sequence[str], taped: TapedLoop | None = None) -> Program:
     """The program of a loop; lanes begin as the first of ``many`` does. ``functions`` are those of the code, in order.
 
-    ``other`` is the same loop over another number of lanes, which tells the axis of the lanes in an array."""
+    ``other`` is the same loop over another number of lanes, which tells the axis of the lanes in an array. A ``taped`` loop of
+    ``many`` says how gradients go back, by adjoints that stand behind the ``functions`` in the code."""
     found = _regions(many, other)
     arrays = [(array, region) for array, region in zip(many.arrays(), found, strict=True) if region]
     regions = {key_of(array): region for array, region in arrays}
@@ -182,7 +214,9 @@ def program_of(many: Pieces, other: Pieces, functions: Sequence[str]) -> Program
     for array, region in arrays:
         before, behind = math.prod(region.before), math.prod(region.behind) * region.dtype.itemsize // HALF
         fills.append((region.first, before, behind, writer.put(array[region.at(0)])))
+    nothing = 0, (), 0, (0,) * ABOUT
+    way_back, adjoints, back, about = _way_back(taped, writer, regions, len(functions)) if taped else nothing
     rows = sum(region.rows for region in regions.values())
-    head = np.array([MAGIC, writer.size, 0, 0, rows, space, 0, *counts, 0], dtype=np.int64)
+    head = np.array([MAGIC, writer.size, 0, 0, rows, space, 0, *counts, way_back], dtype=np.int64)
     lists = [np.ravel(np.array(one, dtype=np.int64)) for one in (moved, staged, fills, writer.relocations)]
-    return Program(np.concatenate([head, *lists, *writer.pieces]), tuple(found), rows, space)
+    return Program(np.concatenate([head, *lists, *writer.pieces]), tuple(found), rows, Threads(space, adjoints, back), about)

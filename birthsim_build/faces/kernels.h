@@ -19,6 +19,6 @@
 
 void birthsim_place(int64_t *program, int64_t data, int64_t lanes);
 void birthsim_fill(int64_t *program, int64_t unused, int64_t unused_too);
-void birthsim_advance(int64_t *program, int64_t periods, int64_t unused);
+void birthsim_advance(int64_t *program, int64_t periods, int64_t zero);
 
 #endif

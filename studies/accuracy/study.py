@@ -14,7 +14,7 @@ from studies.study import Options, Study
 
 def _tasks(options: Options) -> dict[Any, Task]:
     rig = load_parameters(options.parameters or None).to_dict()
-    return {"": Task("accuracy", "accuracy", accuracy, {"rig": rig, "rigs": options.rigs, "seed": options.seed})}
+    return {"": Task("accuracy", accuracy, {"rig": rig, "rigs": options.rigs, "seed": options.seed})}
 
 
 def accuracy(rig: dict[str, Any], rigs: int, seed: int) -> Result:

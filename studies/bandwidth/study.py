@@ -150,8 +150,8 @@ def _tasks(options: Options) -> dict[Any, Task]:
     for peak in options.peak:
         for controller, sensors in MEASURED:
             stem = f"{file_stem(controller)}/{file_stem(sensors)}-{peak:g}"
-            found[controller, sensors, peak] = Task(stem, controller, measure, _settings(controller, sensors, peak, options))
-        found[peak] = Task(f"allowed/{peak:g}", "valves", allowed, _settings("admittance-adaptive", "ideal", peak, options))
+            found[controller, sensors, peak] = Task(stem, measure, _settings(controller, sensors, peak, options))
+        found[peak] = Task(f"allowed/{peak:g}", allowed, _settings("admittance-adaptive", "ideal", peak, options))
     return found
 
 

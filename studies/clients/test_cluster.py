@@ -36,7 +36,7 @@ def files(folder):
 
 
 def test_the_files_are_those_of_joblibs_processes(cluster, tmp_path):
-    tasks = [Task(f"deep/{k}", "all", json.loads, {"s": '{"a": 1}' if k != 3 else "{"}) for k in range(8)]
+    tasks = [Task(f"deep/{k}", json.loads, {"s": '{"a": 1}' if k != 3 else "{"}) for k in range(8)]
     found = {name: run_tasks(tasks, tmp_path / name, 2, "work", where) for name, where in (("joblib", None), ("ray", cluster))}
     assert found["ray"] == found["joblib"]
     assert list(found["ray"][1]) == ["deep/3"]

@@ -155,7 +155,7 @@ def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, s
         "environment": conditions.environment, "sensors": conditions.sensors, "plant": conditions.plant, "hand": conditions.hand
     }  # fmt: skip
     stem = f"cells/{file_stem(name)}/{'-'.join(filter(None, (conditions.short, *list(where.values())[1:])))}"
-    return Task(stem, name, run_cell, {**settings, **where, "episodes": episodes, "seed": seed})
+    return Task(stem, run_cell, {**settings, **where, "episodes": episodes, "seed": seed})
 
 
 def run_cell(

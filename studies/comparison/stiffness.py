@@ -164,11 +164,9 @@ def study_tasks(controllers: Sequence[dict[str, Any]], rig: Parameters) -> dict[
     for settings in controllers:
         name = settings["controller"]
         for study, work in STUDIES.items():
-            tasks[study, name] = Task(f"studies/{study}/{file_stem(name)}", study, work, settings)
+            tasks[study, name] = Task(f"studies/{study}/{file_stem(name)}", work, settings)
         if name in WEIGHED:
             for label, own in (("with friction", rig), ("frictionless", frictionless(rig))):
                 stem = f"studies/disturbance/{name}-{label.replace(' ', '-')}"
-                tasks["disturbance", f"{name}, {label}"] = Task(
-                    stem, "disturbance", disturbance_study, {**settings, "rig": own.to_dict()}
-                )
+                tasks["disturbance", f"{name}, {label}"] = Task(stem, disturbance_study, {**settings, "rig": own.to_dict()})
     return tasks

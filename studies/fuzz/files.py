@@ -162,7 +162,7 @@ def _tasks(folder: Path) -> dict[str, Any]:
 def _run(folder: Path) -> None:
     from baselines.work.tasks import Task, run_tasks
 
-    results, failures = run_tasks([Task("piece", "pieces", _worked, {"seed": 1})], folder, 1, "pieces")
+    results, failures = run_tasks([Task("piece", _worked, {"seed": 1})], folder, 1, "pieces")
     assert not failures
     assert results == {"piece": {"mean": 1.0, "values": [1.0]}}
 

@@ -40,7 +40,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
         for sensors in SENSORS:
             loop = {"world": CIRCLE, "controller": name, "sensors": sensors, "lanes": options.lanes, "steps": 4, "begins": 20}
             loops[f"{name}, {sensors}"] = loop
-    return {name: Task(f"agreement{k}", "agreement", agreement, loop) for k, (name, loop) in enumerate(loops.items())}
+    return {name: Task(f"agreement{k}", agreement, loop) for k, (name, loop) in enumerate(loops.items())}
 
 
 def _kept(options: Options, found: Found) -> Any:

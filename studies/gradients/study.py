@@ -120,12 +120,11 @@ def pushed() -> Result:
 
 def _tasks(options: Options) -> dict[Any, Task]:
     plants = {
-        name: Task(f"plant{k}", "cost", plant_cost, {"lanes": n, "rig": rig})
-        for k, (name, (n, rig)) in enumerate(PLANTS.items())
+        name: Task(f"plant{k}", plant_cost, {"lanes": n, "rig": rig}) for k, (name, (n, rig)) in enumerate(PLANTS.items())
     }
-    loops = {name: Task(f"loop-{law}", "cost", loop_cost, {"law": law}) for name, law in LOOPS.items()}
-    trust = {name: Task(name, "trust", foretold, {"slides": name == "slide"}) for name in ("slide", "rest")}
-    return {**plants, **loops, **trust, "pushed": Task("pushed", "trust", pushed, {})}
+    loops = {name: Task(f"loop-{law}", loop_cost, {"law": law}) for name, law in LOOPS.items()}
+    trust = {name: Task(name, foretold, {"slides": name == "slide"}) for name in ("slide", "rest")}
+    return {**plants, **loops, **trust, "pushed": Task("pushed", pushed, {})}
 
 
 def _kept(options: Options, found: Found) -> Any:

@@ -46,7 +46,7 @@ def haptic_tasks(key: Key, subjects: Sequence[str]) -> dict[str, list[Task]]:
     place = f"pieces/{file_stem(key.settings['controller'])}/{key.sensors}"
     return {
         subject: [
-            Task("-".join([f"{place}-{subject}", *map(str, one.values())]), subject, work, {**key.arguments(), **one})
+            Task("-".join([f"{place}-{subject}", *map(str, one.values())]), work, {**key.arguments(), **one})
             for one in each
         ]
         for subject, (work, each) in variants.items() if subject in subjects

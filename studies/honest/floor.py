@@ -21,7 +21,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
     believed = load_parameters(options.parameters or None)
     rigs = {"honest": as_described(believed), "honest, drawn": believed}
     own = {"episodes": options.episodes, "seed": options.seed}
-    return {kind: Task(kind.replace(", ", "-"), kind, floor, {"rig": rig.to_dict(), **own}) for kind, rig in rigs.items()}
+    return {kind: Task(kind.replace(", ", "-"), floor, {"rig": rig.to_dict(), **own}) for kind, rig in rigs.items()}
 
 
 def floor(rig: dict[str, Any], episodes: int, seed: int) -> Result:

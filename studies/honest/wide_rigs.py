@@ -60,7 +60,7 @@ def measure(
     """
     believed = Parameters.from_dict(rig)
     law = make_controller(controller, believed)
-    drawn = {name: tuple(pair) for name, pair in ranges.items()}
+    drawn = {name: (low, high) for name, (low, high) in ranges.items()}
     worlds: Arguments = {"randomize": drawn, "sensors": "honest", "parameters": believed}
     found = evaluate(environment_id(scenario), law, controller, episodes, seed, progress=False, **worlds)
     within = np.asarray(found.required_strength_ratio) <= STRENGTH
@@ -80,7 +80,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
                 ranges = {figure: around(rig, figure, OFF) for figure in RANGES}
             worlds = {"ranges": ranges, "episodes": min(LANES[told], options.seed + options.episodes - first), "seed": first}
             found[scenario, name, told, first] = Task(
-                f"{scenario}-{name}/{'known' if told else 'default'}-{first}", name, measure,
+                f"{scenario}-{name}/{'known' if told else 'default'}-{first}", measure,
                 {"scenario": scenario, **controller_settings(name, rig), **worlds},
             )  # fmt: skip
     return found

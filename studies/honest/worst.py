@@ -44,7 +44,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
     for name in options.controller:
         make_controller(name, believed)
     return {
-        pair: Task("-".join(pair), pair[0], worst, {"controller": pair[0], "sensors": pair[1], "rig": rig, **own})
+        pair: Task("-".join(pair), worst, {"controller": pair[0], "sensors": pair[1], "rig": rig, **own})
         for pair in pairs
     }  # fmt: skip
 

@@ -72,14 +72,12 @@ def _pieces(policy: str) -> dict[str, list[Task]]:
     for name in run.controllers:
         own = controller_settings(name, rig)
         found[name] = evaluation_tasks(f"{policy}-{name}", own, run.environment, world, *span)
-        found[name].append(Task(f"felt/{file_stem(name)}-{run.sensors}", name, felt.measure, {**own, "sensors": run.sensors}))
+        found[name].append(Task(f"felt/{file_stem(name)}-{run.sensors}", felt.measure, {**own, "sensors": run.sensors}))
     for place in policy_folders(policy):
         network = file_hash(str(place / WEIGHTS))
         own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
         found[place.name] = evaluation_tasks(f"{policy}-{place.name}", own, run.environment, world, *span, evaluate_learned)
-        found[place.name].append(
-            Task(f"felt/{policy}-{place.name}", place.name, felt_by_learned, {**own, "sensors": run.sensors})
-        )
+        found[place.name].append(Task(f"felt/{policy}-{place.name}", felt_by_learned, {**own, "sensors": run.sensors}))
     return found
 
 

@@ -49,7 +49,7 @@ def measure(scenario: str, controller: str, sensors: str, episodes: int, seed: i
 def _tasks(options: Options) -> dict[Any, Task]:
     own = {"episodes": options.episodes, "seed": options.seed}
     return {
-        key: Task("-".join(key), key[0], measure, dict(zip(("scenario", "controller", "sensors"), key, strict=True)) | own)
+        key: Task("-".join(key), measure, dict(zip(("scenario", "controller", "sensors"), key, strict=True)) | own)
         for key in product(options.scenario, CONTROLLERS, SENSORS)
     }
 

@@ -70,4 +70,4 @@ def recover(seed: int, duration: float, experiment: str) -> Result:
 def recovery_tasks(rigs: int, seed: int, duration: float, experiment: str) -> list[Task]:
     """A piece per rig, with seeds from ``seed`` on."""
     settings = {"duration": duration, "experiment": experiment}
-    return [Task(f"{experiment}_{k}", "rigs", recover, {"seed": k, **settings}) for k in range(seed, seed + rigs)]
+    return [Task(f"{experiment}_{k}", recover, {"seed": k, **settings}) for k in range(seed, seed + rigs)]

@@ -61,7 +61,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
         piece = {"policy": str(place), "law": "" if seed else name, "network": file_hash(str(place / WEIGHTS)), **where}
         count = {"episodes": options.episodes} if what == "errors" else {"rigs": options.rigs}
         stem = f"{what}-{Path(name).name}-{seed}"
-        tasks[what, name, seed] = Task(stem, what, errors if what == "errors" else felt, {**piece, **count})
+        tasks[what, name, seed] = Task(stem, errors if what == "errors" else felt, {**piece, **count})
     return tasks
 
 

@@ -54,7 +54,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
                 "policy": str(place), "seed_name": name, "network": network, "hand": hand, "sensors": options.sensors,
                 "rig": rig.to_dict(), "seed": options.seed, "episodes": options.episodes,
             }  # fmt: skip
-            tasks[hand, name] = Task(f"{hand}-{name}", hand, own_motion, settings)
+            tasks[hand, name] = Task(f"{hand}-{name}", own_motion, settings)
         own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
         pushed, work = (own, evaluate_learned) if name else (controller_settings(law, rig), None)
         pieces = evaluation_tasks(f"pushed-{name}", pushed, STATIC, world, options.episodes, options.seed, work)

@@ -62,7 +62,7 @@ def _task(where: tuple[str, str, bool], controller: str, policy: str, options: O
         "episodes": options.episodes, "seed": options.seed,
         "network": file_hash(str(SHIPPED / policy / WEIGHTS)) if policy else "",
     }  # fmt: skip
-    return Task(stem, "policies" if policy else controller, score_cell, settings)
+    return Task(stem, score_cell, settings)
 
 
 def score_cell(

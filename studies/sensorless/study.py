@@ -45,7 +45,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
                 "lanes": min(LANES[plant], options.seed + options.episodes - first),
             }  # fmt: skip
             stem = f"{rig.replace(', ', '-').replace(' ', '-')}/{plant}-{first}"
-            found[rig, plant, first] = Task(stem, rig, measure, {**own, **more})
+            found[rig, plant, first] = Task(stem, measure, {**own, **more})
     return found
 
 

@@ -44,10 +44,10 @@ def _tasks(options: Options) -> dict[Any, Task]:
         speed.Process(Path(options.beside)).close()  # says at once what is wrong with it
     own = {"seconds": options.seconds}
     if options.compile:
-        return {"first": Task("first", "speed", first, {})}
+        return {"first": Task("first", first, {})}
     return {
-        "here": Task("here", "speed", here, own),
-        "environments": Task("environments", "speed", environments, {**own, "beside": options.beside}),
+        "here": Task("here", here, own),
+        "environments": Task("environments", environments, {**own, "beside": options.beside}),
     }  # fmt: skip
 
 

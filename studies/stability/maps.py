@@ -246,7 +246,7 @@ def stability_tasks(
     own, name = {"sensors": sensors, "points": points, "seed": seed}, settings["controller"]
     return {
         (key, label): Task(
-            f"pieces/{file_stem(name)}/{key}-{file_stem(label)}", key, draw_map,
+            f"pieces/{file_stem(name)}/{key}-{file_stem(label)}", draw_map,
             {**settings, "key": key, "options": options, **own},
         )
         for key in maps for label, options in variants_of(name).items()

@@ -25,7 +25,7 @@ UNITS = {"controller": "", "mass": "kg", "valve": "s", "latency": "s", "limit": 
 
 def _tasks(_: Options) -> dict[Any, Task]:
     cases = itertools.product(("backstepping", "backstepping-cartesian"), MASSES, LAGS, LATENCIES)
-    return {case: Task("-".join(map(str, case)), case[0], stiffest, dict(zip(UNITS, case, strict=False))) for case in cases}
+    return {case: Task("-".join(map(str, case)), stiffest, dict(zip(UNITS, case, strict=False))) for case in cases}
 
 
 def _kept(_: Options, found: Found) -> Any:

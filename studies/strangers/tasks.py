@@ -139,6 +139,6 @@ def stranger_tasks(rigs: int, seed: int, duration: float, controllers: list[str]
     """A piece per stranger and rig, with seeds from ``seed`` on."""
     settings = {"duration": duration, "controllers": controllers}
     return {
-        (name, one): Task(f"{k}_{one}", name, meet, {"stranger": name, "seed": one, **settings})
+        (name, one): Task(f"{k}_{one}", meet, {"stranger": name, "seed": one, **settings})
         for k, name in enumerate(STRANGERS) for one in range(seed, seed + rigs)
     }  # fmt: skip

@@ -34,7 +34,7 @@ def pieces_of(points: Sequence[Point], sweep: Sweep, first: int = 0) -> dict[Pie
         try:
             tasks = tasks_of(point, sweep)
         except ValueError as error:
-            tasks = [Task(f"point {number}", "refused", refuse, {"why": str(error)})]
+            tasks = [Task(f"point {number}", refuse, {"why": str(error)})]
         pieces |= {Piece(number, point, len(tasks)): task for task in tasks}
     return pieces
 
@@ -79,10 +79,9 @@ def _tasks(point: Point, sweep: Sweep) -> list[Task]:
     if asked["controller"] == "residual" or "policy" in asked:
         # Policies need an extra, which laws do not.
         from agents.policy.files import WEIGHTS
-        from agents.policy.seeds import best_policy, policy_folders
+        from agents.policy.seeds import best_policy
 
         name = asked.get("policy") or policy_of(asked["environment"])
-        policy_folders(name)  # which says what is allowed where there is none
         place = best_policy(name)
         own = {
             "controller": "residual", "source": file_hash(str(place / WEIGHTS)), "rig": believed.to_dict(),
@@ -136,7 +135,7 @@ def _trained(asked: dict[str, Any], believed: Parameters, world: dict[str, Any])
         "environment": asked["environment"], "world": world, "files": files, "seed": asked["seed"],
         "episodes": asked["episodes"],
     }  # fmt: skip
-    return Task("training", "trainings", train_point, settings, keeps=True)
+    return Task("training", train_point, settings, keeps=True)
 
 
 def _group(group: str, asked: dict[str, Any]) -> dict[str, Any]:

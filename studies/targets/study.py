@@ -177,7 +177,7 @@ def _firmware(report: dict[str, Any]) -> str:
 
 STUDY = Study(
     (__name__, "agents.policy.controller"), {"target": TARGETS},
-    lambda options: {name: Task(name, "targets", built, {"target": name}) for name in dict.fromkeys(options.target)},
+    lambda options: {name: Task(name, built, {"target": name}) for name in dict.fromkeys(options.target)},
     lambda _, found: dict(found), {"speed": "control periods/s", "cycles": "1", "bytes": "B"}, _shown, timed=True,
     allowed={"target": TARGETS}, words={"target": "what is built; every: all loops as WebAssembly"},
 )  # fmt: skip

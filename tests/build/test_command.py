@@ -47,10 +47,11 @@ def test_laws_need_nothing_that_trains_policies():
 
 
 def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
-    def compiled(functions, target, out, space):
+    def compiled(functions, target, out, **given):
         assert target == "ptx"
         assert "baselines.rivals.pid:control" in functions
-        assert space == np.fromfile(out.parent / "circle_ideal_pid.bin", dtype=np.int64)[threads.SPACE]
+        words = np.fromfile(out.parent / "circle_ideal_pid.bin", dtype=np.int64)
+        assert given == {"threads": threads.Threads(words[threads.SPACE])}
         out.with_suffix(".ptx").write_text("text")
 
     monkeypatch.setattr("birthsim_build.building.compile_object", compiled)

@@ -242,3 +242,12 @@ def test_what_is_asked_of_cupy(monkeypatch, mode):
         for one, other in zip(here.step(actions)[:4], there.step(actions.view(There))[:4], strict=True):
             assert type(other) is There
             assert_equal(one, np.array(other))
+    # Gradients, from the middle of an episode on.
+    recorders = [env.unwrapped.record() for env in (here, there)]
+    for env, given in ((here, actions), (there, actions.view(There))):
+        env.step(given)
+    ones = {"reward": np.ones(7), "motion": np.ones((4, 7)), "observation": np.ones(here.observation_space.shape)}
+    found = recorders[0].taken()(**ones), recorders[1].taken()(**{name: one.view(There) for name, one in ones.items()})
+    for one, other in zip(*found, strict=True):
+        assert type(other) is There
+        assert_equal(one, np.array(other))

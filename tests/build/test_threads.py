@@ -103,7 +103,7 @@ def assert_exact(text):
 def test_ptx_is_exact(tmp_path):
     if llvm_version_info[0] < LEAST_LLVM:
         pytest.skip("needs LLVM 22")
-    compile_object([WAY], "ptx", tmp_path / "code.o", space=512)
+    compile_object([WAY], "ptx", tmp_path / "code.o", threads=threads.Threads(512))
     assert_exact((tmp_path / "code.ptx").read_text())
 
 
@@ -167,7 +167,7 @@ def everything(tmp_path_factory):
         begun(2, sensors=sensors, controller=name) for name in (*LISTED, "residual:circle") for sensors in ("ideal", "lab")
     ]
     functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
-    compile_object(sorted(functions), "ptx", folder / "all.o", space=1024)
+    compile_object(sorted(functions), "ptx", folder / "all.o", threads=threads.Threads(1024))
     return folder / "all.ptx"
 
 
@@ -187,7 +187,7 @@ def test_fusing_is_given_no_chance(tmp_path):
     if ptx.assembler() is None:
         pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
     loop = pieces_of(begun(2, sensors="lab", controller="admittance-backstepping").simulation)
-    compile_object(loop.functions, "ptx", tmp_path / "code.o", space=448)
+    compile_object(loop.functions, "ptx", tmp_path / "code.o", threads=threads.Threads(448))
     made = {}
     for fuses in ("true", "false"):
         taken = ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
@@ -205,7 +205,7 @@ def test_an_exported_program_runs_by_its_own_kernels(tmp_path):
     functions, space, data = write_programs([("circle", "lab", "admittance-backstepping")], Parameters(), SEED, tmp_path)
     (name,) = data
     words, about = np.fromfile(tmp_path / f"{name}.bin", dtype=np.int64), json.loads((tmp_path / f"{name}.json").read_text())
-    lanes, run = 33, Host().load(tuple(functions), space)
+    lanes, run = 33, Host().load(tuple(functions), threads.Threads(space))
     rows = np.full((about["words_of_data"], lanes), -1.0)
     for kernel, *numbers in (("place", rows.ctypes.data, lanes), ("fill", 0, 0), *[("advance", about["periods"], 0)] * 3):
         run(kernel, lanes, words.ctypes.data, *numbers)

@@ -107,7 +107,7 @@ TABLE = {
     "train --parameters rig.toml --out x": MASS,
     "train --out own.py": "own.py' is a file; allowed: a folder",
     "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
-    "export --to onnx nowhere": "has no policy.safetensors",
+    "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to fmux": "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help",
     "export --to stone": "--to 'stone'; allowed: onnx, wasm, ",
     "export": "--to is missing; allowed: onnx, wasm, ",

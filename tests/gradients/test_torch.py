@@ -11,6 +11,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed")
 
 from agents.gradients.rollouts import Worlds  # noqa: E402
+from tests.build.targets import need_threads  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -53,18 +54,67 @@ def test_the_end_of_an_episode_cuts_gradients() -> None:
     assert float(actions[1].grad.abs().max()) > 0.0
 
 
+def test_the_last_step_of_an_episode_has_the_gradients_of_any_other() -> None:
+    """Where the next episode has another rig."""
+    found = []
+    for steps in (1, 2):
+        worlds = worlds_of(3, randomize=True, max_episode_steps=steps)
+        action = torch.full((3, 4), 0.05, requires_grad=True)
+        now = worlds.step(worlds.reset(seed=1), action)
+        assert bool(now.ended.all()) == (steps == 1)
+        now.reward.sum().backward()
+        found.append(action.grad.numpy())
+    assert np.abs(found[0]).max() > 0.0
+    np.testing.assert_array_equal(*found)
+
+
 def test_worlds_that_end_otherwise_are_refused() -> None:
     with pytest.raises(ValueError, match="SameStep"):
         Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2))
 
 
-@pytest.mark.slow
-def test_the_example_learns_in_a_hundred_updates() -> None:
-    spec = importlib.util.spec_from_file_location("gradients_example", ROOT / "examples" / "gradients.py")
+def example(name: str) -> Any:
+    """A script of ``examples`` as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
-    errors = example.train(120)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_the_example_learns_in_a_hundred_updates() -> None:
+    errors = example("gradients").train(120)
     assert np.median(errors[-20:]) < 1.5
     assert np.median(errors[:20]) > 3.0
+
+
+@pytest.mark.parametrize("sensors", ["ideal", pytest.param("honest", marks=pytest.mark.slow)])
+def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str) -> None:
+    """Over the ends of episodes, where other rigs begin."""
+    need_threads()
+    found = []
+    for device in (None, "host"):
+        worlds = worlds_of(5, randomize=True, max_episode_steps=3, sensors=sensors, device=device)
+        now, loss = worlds.reset(seed=1, options={"staggered": True}), torch.zeros(())
+        actions = 0.1 * torch.sin(torch.arange(100.0).reshape(5, 5, 4))
+        actions.requires_grad = True
+        for action in actions:
+            now = worlds.step(now, action)
+            loss = loss - now.reward.mean() + (now.motion**2).sum() + now.state[2].sum() + now.observation.sum()
+        loss.backward()
+        found.append((now, actions.grad))
+    (one, by_one), (other, by_other) = found
+    assert float(by_one.abs().min()) > 0.0
+    for here, there in zip((*one, by_one), (*other, by_other), strict=True):
+        np.testing.assert_array_equal(here.detach().numpy(), there.detach().numpy())
+
+
+@pytest.mark.slow
+def test_a_policy_learns_the_circle_by_gradients_of_a_device() -> None:
+    need_threads()
+    train = example("device_policy_gradient").train
+    errors = train("host", 120, 32)
+    assert np.median(errors[-20:]) < 0.3 * np.median(errors[:20])
+    assert train("cpu", 10, 32) == errors[:10]

@@ -44,7 +44,7 @@ def rows() -> Rows:
 
 def write(content: Rows, path: Path) -> None:
     lines = [",".join(content), *(",".join(f"{value:.10g}" for value in row) for row in zip(*content.values(), strict=True))]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def test_without_forces_there_is_no_hand_and_a_recording_has_two(tmp_path: Path) -> None:

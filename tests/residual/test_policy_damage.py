@@ -55,7 +55,10 @@ def test_a_folder_without_a_policy_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "empty").mkdir()
     for name in ("file", "empty", "nowhere"):
-        assert_refused(tmp_path / name, rf"has no {WEIGHTS}; allowed: a folder that birthsim train wrote, with {WEIGHTS}")
+        for read in (load_policy, lambda folder: ResidualController(policy=folder)):
+            with pytest.raises(ValueError, match=r"; allowed: a folder that birthsim train wrote") as caught:
+                read(tmp_path / name)
+            assert repr(str(tmp_path / name)) in str(caught.value)
 
 
 @pytest.mark.parametrize("policy", [POLICY, REMEMBERS], ids=["forward", "with a memory"])

@@ -19,7 +19,7 @@ def square(number, log):
 def study(log, **more):
     return Study(
         (__name__,), {"numbers": (1, 2), "scale": 2.0, "name": "", "quiet": False},
-        lambda options: {k: Task(f"{k}", "squares", square, {"number": k, "log": str(log)}) for k in options.numbers},
+        lambda options: {k: Task(f"{k}", square, {"number": k, "log": str(log)}) for k in options.numbers},
         lambda options, found: {str(k): options.scale * one["square"] for k, one in found.items()}, {"square": "m2"},
         lambda content: {"one.md": json.dumps(content["figures"])}, **more,
     )  # fmt: skip

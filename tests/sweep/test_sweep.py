@@ -83,7 +83,7 @@ def test_a_grid_gives_the_same_bytes_with_one_process_with_two_and_after_a_longe
     same(out, swept(GRID, "--jobs", 2, out="two")[2])
     longer = GRID.replace("[3.0, 4.0]", "[2.5, 3.0, 4.0]")
     _, said, _ = swept(longer, "--jobs", 1)
-    assert "sweep: 4 of 6 are there with these settings, rig and code, and are kept: backstepping 2, pid 2" in said
+    assert "sweep: 4 of 6 are there with these settings, rig and code, and are kept" in said
     same(swept(GRID, "--jobs", 1)[2], swept(GRID, out="two")[2])
 
 
@@ -138,7 +138,7 @@ def test_a_point_may_train_the_policy_that_it_evaluates(swept):
     assert len(list(out.rglob("policy.safetensors"))) == 2
     rows = pq.read_table(out / "episodes.parquet").to_pylist()
     assert [row["training.seed"] for row in rows] == [0, 0, 1, 1]
-    assert "trainings 2" in swept(text)[1]
+    assert "sweep: 2 of 2 are there" in swept(text)[1]
 
 
 def test_the_stored_result_is_of_the_example_as_it_is():

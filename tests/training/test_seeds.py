@@ -3,6 +3,7 @@
 import base64
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -179,7 +180,7 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_pat
     asked = []
 
     def computed(tasks, folder, jobs, title, cluster):
-        asked.extend(task.group for task in tasks)
+        asked.extend(Path(task.settings.get("policy", task.settings["controller"])).name for task in tasks)
         one = evaluation("", np.ones(4))
         trace = np.ones((3, 4, 2), dtype="<f4")
         result = {
@@ -192,7 +193,7 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_pat
 
     monkeypatch.setattr(command, "run_tasks", computed)
     command.run(command.Settings(env="BirthSIM/Probe-v2", controller=["residual"], episodes=4, out=tmp_path))
-    assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(5))]
+    assert asked == ["backstepping", "backstepping-force-first", *(f"seed_{k}" for k in range(5))]
     assert "residual, 5 seeds " in capsys.readouterr().out
     for page in ("evaluation.md", "seeds.md"):
         assert "; 5 training seeds" in (tmp_path / page).read_text(encoding="utf-8")

@@ -101,7 +101,7 @@ def is_running(process: int) -> bool:
         return False
     stat = Path(f"/proc/{process}/stat")
     # Nobody may be there to bury an orphan.
-    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+    return not stat.exists() or stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
 
 
 def waited_for(state, seconds=120):

@@ -37,7 +37,7 @@ def log(tmp_path):
 
 
 def made(log, work=square, numbers=range(5)):
-    return [Task(f"deep/{k}", f"group {k % 2}", work, {"log": str(log), "number": k}) for k in numbers]
+    return [Task(f"deep/{k}", work, {"log": str(log), "number": k}) for k in numbers]
 
 
 def ran(log):
@@ -65,17 +65,14 @@ def test_an_interrupted_run_goes_on_where_it_stopped_and_ends_like_an_uninterrup
     results, _ = run_tasks(made(log, interrupt), tmp_path / "out", 1, "work")
     assert ran(log) == [0, 1, 2, 3, 4]
     assert results == whole
-    assert (
-        "work: 3 of 5 are there with these settings, rig and code, and are kept: group 0 2, group 1 1"
-        in capsys.readouterr().out
-    )
+    assert "work: 3 of 5 are there with these settings, rig and code, and are kept" in capsys.readouterr().out
     assert run_tasks(made(log), tmp_path / "out", 1, "work")[0] == whole
     assert len(ran(log)) == 5
 
 
 def test_pieces_of_other_settings_or_other_code_are_computed_anew(log, tmp_path, capsys, monkeypatch):
     run_tasks(made(log), tmp_path / "out", 1, "work")
-    moved = [Task(task.name, task.group, square, {**task.settings, "number": 7}) for task in made(log, numbers=[2])]
+    moved = [Task(task.name, square, {**task.settings, "number": 7}) for task in made(log, numbers=[2])]
     results, _ = run_tasks([*made(log, numbers=[0, 1]), *moved], tmp_path / "out", 1, "work")
     assert ran(log)[5:] == [7]
     assert results["deep/2"]["square"] == 49

@@ -7,7 +7,7 @@ import numpy as np
 
 from birthsim_env.loop.gradients.traced import Adjoint, Traced
 from birthsim_env.loop.rows import FORCE, MOTION, OPENING, STATE, WORLD
-from birthsim_env.loop.stage import Stage, address_of, block, scratch
+from birthsim_env.loop.stage import Stage, block, carray, pointer, scratch
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.compilation import BLOCK, kernel
@@ -32,7 +32,8 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     steps = int(clock.steps)
     step = clock.period / steps
     given, weighs, result, p = block(tape, INPUTS), block(bars, INPUTS), block(out, INPUTS), scratch(PARAMETERS)
-    points, g, late = np.empty((STAGES * steps, STATES, BLOCK)), scratch(STATES), scratch(STATES)
+    points = carray(pointer(out + 8 * BLOCK * INPUTS, np.float64), (STAGES * steps, STATES, BLOCK))
+    g, late = scratch(STATES), scratch(STATES)
     x, dx, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES), scratch(STATES)
     u, f, by, total = scratch(4), scratch(2), scratch(INPUTS), scratch(INPUTS)
     dynamics.load(block(rig, PARAMETERS), 0, n, p)
@@ -58,7 +59,8 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
 
 def plant_adjoint(stage: Stage) -> Adjoint:
     """Of ``loop.world.plant_stage``, but for the motion of the end effector."""
-    return Adjoint(address_of(_back), ROWS, ROWS, stage.constants)
+    steps = int(stage.constants[Clock.steps.first])
+    return Adjoint(_back, ROWS, ROWS, stage.constants, room=STAGES * steps * STATES)
 
 
 def motion_traced() -> Traced:

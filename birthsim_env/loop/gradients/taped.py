@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.gradients.traced import Adjoint
 from birthsim_env.loop.loop import Loop, Place, load_rows, run_stage, store_rows
-from birthsim_env.loop.stage import Stage, carray, pointer
+from birthsim_env.loop.stage import Stage, address_of, carray, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
@@ -66,12 +66,14 @@ def _forward(
 
 @kernel
 def _backward(
-    entries: Whole, touched: Whole, periods: int, first: int, last: int, rig: Array, tape: Array, bars: Array, most: int
-) -> None:
+    entries: Whole, touched: Whole, periods: int, first: int, last: int, rig: Array, tape: Array, bars: Array, takes: int,
+    gives: int,
+) -> None:  # fmt: skip
     """``entries`` (E, 6): address of an adjoint, of its constants, rows that it reads from the tape, where its rows stand in
-    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back."""
+    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back. An adjoint ``takes`` so many
+    rows at most, and needs so many for what it ``gives``."""
     space, p = np.empty((bars.shape[0], BLOCK)), np.empty((at.PARAMETERS, BLOCK))
-    given, result = np.zeros((most, BLOCK)), np.zeros((most, BLOCK))
+    given, result = np.zeros((takes, BLOCK)), np.zeros((gives, BLOCK))
     for start in range(first, last, BLOCK):
         n, place = min(BLOCK, last - start), tape.shape[1]
         for row in range(bars.shape[0]):
@@ -107,9 +109,10 @@ class TapedLoop(Loop):
         self, lanes: int, world: Sequence[Place], seen: Sequence[Place], stages: Sequence[Stage], closing: Sequence[Stage]
     ) -> None:
         super().__init__(lanes, world, seen, stages, closing)
-        self._open = len(stages)
+        self.opened = len(stages)
         self._tape: Array = np.zeros((0, 0, 0))
-        self._addresses = [0] * self._rows
+        self.sources: list[tuple[NDArray[Any] | None, int]] = [(None, row) for row in range(self._rows)]
+        """Where each row is: a table and its row, or the space."""
         self._placed: dict[int, int] = {}
 
     @property
@@ -123,24 +126,25 @@ class TapedLoop(Loop):
             raise ValueError(f"a table {table.shape} of {self._lanes} lanes")
         place = table.ctypes.data
         if place not in self._placed:
-            self._placed[place] = len(self._addresses)
-            stride = 8 * self._lanes if table.dtype == np.float64 and not lanes_first else 0
-            self._addresses += [place + stride * row if stride else 0 for row in range(table.size // self._lanes)]
+            self._placed[place] = len(self.sources)
+            self.sources += [(table, row) for row in range(table.size // self._lanes)]
         return self._placed[place]
 
     def differentiate(self, adjoints: Sequence[tuple[int, Adjoint]], live: Sequence[int]) -> None:
         """Go back by these from now on, with bars for ``live`` rows."""
         reads, touched, kept, entries = list[tuple[int, int]](), list[int](), [], []
-        self._constants, at = [one.constants for _, one in adjoints], {row: k for k, row in enumerate(live)}
+        self.adjoints, self.live, at = adjoints, live, {row: k for k, row in enumerate(live)}
         for s, one in adjoints:
             kept.append((s, int(one.after), len(reads), len(one.reads)))
             address = 0 if one.constants is None else one.constants.ctypes.data
-            entries.append((one.address, address, len(one.reads), len(touched), len(one.rows), int(s >= self._open)))
-            reads += [(self._addresses[row], row) for row in one.reads]
+            where = address_of(one.function)
+            entries.append((where, address, len(one.reads), len(touched), len(one.rows), int(s >= self.opened)))
+            found = [self.sources[row] for row in one.reads]
+            reads += [(0 if table is None else table.ctypes.data + 8 * self._lanes * row, row) for table, row in found]
             touched += [at[row] for row in one.rows]
         self._keeps, self._entries = np.array(kept, dtype=np.int64), np.array(entries, dtype=np.int64)
         self._reads, self._touched = np.array(reads, dtype=np.int64).reshape(-1, 2), np.array(touched, dtype=np.int64)
-        self._most = max(len(one.rows) for _, one in adjoints)
+        self.most = tuple(max(len(one.rows) + room * one.room for _, one in adjoints) for room in (0, 1))
 
     def new_tape(self, periods: int) -> Array:
         """Room for ``periods`` control periods, the last one with what closes it."""
@@ -161,7 +165,7 @@ class TapedLoop(Loop):
         """Take ``bars``, gradients to the live rows at the end (rows, N), to the beginning."""
 
         def work(periods: int, first: int, last: int) -> int:
-            _backward(self._entries, self._touched, periods, first, last, rig, tape, bars, self._most)
+            _backward(self._entries, self._touched, periods, first, last, rig, tape, bars, *self.most)
             return 0
 
         self._spread(work, periods, threads)

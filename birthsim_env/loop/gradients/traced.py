@@ -14,7 +14,7 @@ import numpy as np
 
 from birthsim_env.loop import stage as stages
 from birthsim_env.loop.rows import SEEN, WORLD
-from birthsim_env.loop.stage import Stage, address_of, layouts_of
+from birthsim_env.loop.stage import Stage, layouts_of
 from birthsim_env.physics.gradients import source, symbols, tracing
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
@@ -47,16 +47,18 @@ def adjoint(tape, bars, out, rig, constants, lane, n):
 
 @dataclass
 class Adjoint:
-    """How the bars of a stage go back: ``address`` of its code, and the rows whose bars it takes and gives.
+    """How the bars of a stage go back: its ``function``, and the rows whose bars it takes and gives.
 
-    The rows that it ``reads`` of the space are kept on the tape before the stage, or ``after`` it.
+    The rows that it ``reads`` of the space are kept on the tape before the stage, or ``after`` it. It computes in ``room``
+    rows behind the bars that it gives.
     """
 
-    address: int
+    function: Callable[..., int]
     reads: list[int]
     rows: list[int]
     constants: Any = None
     after: bool = False
+    room: int = 0
 
 
 @dataclass
@@ -95,7 +97,7 @@ class Traced:
             graph.nodes[self.inputs[row].at] = ("input", "a", k)
         text = source.loop(graph, "back", ("a", "b", "o"), results)
         text = HEAD + text + KERNEL.format(reads=max(1, len(reads)), rows=len(rows))
-        return Adjoint(address_of(source.module_of(text).adjoint), reads, rows)
+        return Adjoint(source.module_of(text).adjoint, reads, rows)
 
 
 class _Place:

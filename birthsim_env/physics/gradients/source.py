@@ -106,6 +106,10 @@ def loop(graph: Graph, name: str, arrays: Iterable[str], outputs: Iterable[Outpu
     return "\n".join([*lines, ""])
 
 
+TEXTS: dict[str, str] = {}
+"""Name -> source of the modules that ``module_of`` has made."""
+
+
 @cache
 def module_of(text: str) -> ModuleType:
     """A module of generated source, kept beside the machine code of kernels under the hash of its text.
@@ -122,6 +126,6 @@ def module_of(text: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    sys.modules[name], TEXTS[name] = module, text
     spec.loader.exec_module(module)
     return module

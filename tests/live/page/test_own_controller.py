@@ -13,7 +13,7 @@ LOST = "document.querySelector('#lost').textContent"
 @pytest.fixture(scope="module")
 def mine(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("own") / "mine.py"
-    path.write_text(OWN)
+    path.write_text(OWN, encoding="utf-8")
     return path
 
 
