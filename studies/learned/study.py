@@ -53,6 +53,7 @@ RUNS = {
         )
     },
     "circle_residual_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000),
+    "circle_lab_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000, ("admittance-backstepping", "admittance-adaptive"), "lab"),
 }  # fmt: skip
 """Policy -> its run; seeds were never used for training or design."""
 
