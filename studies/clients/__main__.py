@@ -38,7 +38,7 @@ CLIENTS = {
     "cleanrl": Client(extras="[agents]", alone=("cleanrl==1.2.0",)),
     "torchrl": Client(extras="[agents]", needs=("torchrl==0.14.1",)),
     "skrl": Client(extras="[agents]", needs=("skrl==2.1.1",)),
-    # Tianshou's virtualenv asks for filelock below 4; its interface imports rliable, which only an extra with old packages names.
+    # Tianshou's virtualenv asks for filelock below 4; rliable, which it imports, is in an extra with old packages.
     "tianshou": Client(extras="[agents]", needs=("tianshou==2.0.1", "rliable==1.2.0"), freed=("filelock",)),
     # d3rlpy pins gymnasium 1.0.0; these are what it imports.
     "offline": Client(
