@@ -13,6 +13,6 @@ def stage(words: str) -> None:
 def connect(app) -> None:
     """Name the stages that Sphinx runs through."""
     app.connect("env-before-read-docs", lambda app, env, pages: stage(f"reading {len(pages)} pages"))
-    app.connect("source-read", lambda app, page, source: stage(f"running {page}") if page.startswith("tutorials/") else None)
+    app.connect("source-read", lambda app, page, source: stage(f"running {page}") if "{code-cell}" in source[0] else None)
     app.connect("env-updated", lambda app, env: stage("writing pages"))
     app.connect("build-finished", lambda app, exception: stage("done" if exception is None else "failed"), priority=900)
