@@ -154,7 +154,7 @@ lint: $(READY)
 
 # CHANGELOG.md tells of the past.
 prose: $(NPM)/.ready
-	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md docs
+	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md CODE_OF_CONDUCT.md paper.md docs
 	python3 docs/_prose/words.py
 
 # What comes from npm: the reader of the prose, and axe-core, with which tests look at pages.
