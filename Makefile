@@ -232,8 +232,7 @@ learned: $(READY)
 	cp $(OUT)/studies/learned/learning_curves.png $(OUT)/studies/by-gradients/from_scratch.png docs/
 
 scratch: $(READY)
-	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
-	cp $(OUT)/scratch/scratch.png docs/
+	$(BIN)/python examples/from_scratch.py --out $(OUT)/scratch
 
 targets: $(READY)
 	$(BIN)/birthsim study targets

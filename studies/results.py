@@ -19,7 +19,7 @@ ENGINE = (
     "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "birthsim_env/drawing/",
     "baselines/figures/", "studies/study.py", "studies/results.py",
 )  # fmt: skip
-"""What reads options, keeps pieces, describes controllers and draws, and decides no figure: a change of it makes no result stale."""
+"""What reads options, keeps pieces, describes controllers and draws, and decides no figure. It makes no result stale."""
 
 Content = dict[str, Any]
 """What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there

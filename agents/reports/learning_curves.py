@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from baselines.bench.statistics import crossed_interval, interquartile_mean
-from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
+from baselines.figures.style import ACCENT, COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, log_ticks, save
 from birthsim_env.physics.compiled.lanes import Array
 
 FIGURES = (
-    ("pooled_mm", "pooled settled error (mm)"),
-    ("tail_mm", "settled error, 95 % quantile (mm)"),
-    ("stiffness_error_percent", "error along the push (%)"),
+    ("pooled_mm", "settled error (mm)"),
+    ("tail_mm", "95th percentile (mm)"),
+    ("stiffness_error_percent", "stiffness error (%)"),
     ("hunting_mm", "hunting (mm)"),
-    ("saturation_percent", "time at a valve's limit (%)"),
+    ("saturation_percent", "valves saturated (%)"),
 )
 """Figures of a validation, where they say something."""
 
@@ -67,39 +67,50 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
     curves = [(key, label, *over_seeds(trainings, key)) for key, label in FIGURES]
     said = [curve for curve in curves if np.isfinite(curve[-1]).any()]
     with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(1, len(said), figsize=(2.6 * len(said), 3.2), layout="constrained", squeeze=False)
-        for axes, (key, label, steps, (middle, low, high)) in zip(panels[0], said, strict=True):
+        rows = -(-len(said) // 2)
+        size = COLUMN, 1.5 * rows + 0.9
+        figure, panels = plt.subplots(rows, min(len(said), 2), figsize=size, layout="constrained", squeeze=False, sharex=True)
+        for axes in panels.flat[len(said) :]:
+            axes.set_visible(False)
+        for k, (axes, (key, label, steps, (middle, low, high))) in enumerate(zip(panels.flat, said, strict=False)):
             axes.fill_between(1e-6 * steps, low, high, color=MIDDLE, alpha=0.25, lw=0)
             for training in trainings:
                 own = [_number(point[key]) for point in training["curve"]]
                 at = [1e-6 * point["steps"] for point in training["curve"]]
-                name = "every seed" if training is trainings[0] else None
-                axes.plot(at, own, color=ACCENT, lw=0.7, ls=":", label=name)
-            axes.plot(1e-6 * steps, middle, color=MIDDLE, lw=1.6, label="interquartile mean, 95 % interval")
+                axes.plot(at, own, color=ACCENT, lw=0.7, ls=":", label="every seed")
+            axes.plot(1e-6 * steps, middle, color=MIDDLE, label="interquartile mean, 95 % interval")
             law = [_number(training["law"][key]) for training in trainings]
-            axes.axhline(interquartile_mean(law), color=DARK, ls="--", lw=1.0, label="law")
-            axes.set(xlabel="policy steps (million)", ylabel=label)
-            axes.set_ylim(bottom=0)
-        legend_below(figure, *panels[0][0].get_legend_handles_labels())
-        environment = trainings[0]["settings"]["environment"]
-        figure.suptitle(f"{environment}: validation of {len(trainings)} training seeds", fontsize=9.5)
+            axes.axhline(interquartile_mean(law), color=DARK, ls="--", label="without the policy")
+            axes.set(title=label, ylim=(0, None))
+            if k + panels.shape[1] >= len(said):
+                axes.set_xlabel("policy steps (million)")
+                axes.tick_params(labelbottom=True)
+        key, label, _, (middle, *_) = said[0]
+        before = interquartile_mean([_number(training["law"][key]) for training in trainings])
+        name, _, unit = label.rpartition(" ")
+        headline(figure, f"Training changes the {name} from {before:.2g} to {middle[-1]:.2g} {unit.strip('()')}")
+        legend_below(figure, said=f"{trainings[0]['settings']['environment']}, {len(trainings)} training seeds")
         return save(figure, folder, "learning_curves")
 
 
 def draw_side_by_side(trainings: Mapping[str, Sequence[dict[str, Any]]], folder: Path, name: str) -> list[Path]:
     """Draw pooled errors of the trainings of each algorithm over policy steps and over wall time (``name``, PNG and SVG)."""
     with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(1, 2, figsize=(7.4, 3.0), layout="constrained", sharey=True)
-        measures = ("steps", 1e-6, "policy steps (million)"), ("seconds", 1.0, "time (s)")
+        figure, panels = plt.subplots(1, 2, figsize=(COLUMN, 2.5), layout="constrained", sharey=True)
+        measures, finals = (("steps", 1e-6, "policy steps (million)"), ("seconds", 1.0, "time (s)")), dict[str, list[float]]()
         for axes, (measure, unit, label) in zip(panels, measures, strict=True):
-            for color, (algorithm, own) in zip((ACCENT, MIDDLE), trainings.items(), strict=True):
+            for color, style, (algorithm, own) in zip((ACCENT, MIDDLE), "-:", trainings.items(), strict=True):
                 for training in own:
                     points = training["curve"][1:]
                     at, error = ([_number(point[key]) for point in points] for key in (measure, "pooled_mm"))
-                    axes.plot(unit * np.array(at), error, color=color, lw=1.0, label=algorithm if training is own[0] else None)
+                    axes.plot(unit * np.array(at), error, color=color, ls=style, label=algorithm)
+                    finals.setdefault(algorithm, []).append(error[-1])
             axes.set(yscale="log", xlim=0, xlabel=label)
+        log_ticks(panels[0].yaxis, 1.0, 3.0)
         panels[0].set_ylabel(dict(FIGURES)["pooled_mm"])
-        legend_below(figure, *panels[0].get_legend_handles_labels())
+        reached = ", ".join(f"{algorithm} {np.median(errors):.2g} mm" for algorithm, errors in finals.items())
+        headline(figure, f"Settled error reached: {reached}")
+        legend_below(figure, said="a line for every training seed")
         return save(figure, folder, name)
 
 

@@ -1,12 +1,13 @@
 """Figures of an identification: residuals over time and by lag, and intervals of the parameters."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
-from baselines.figures.runs import ACCENT, DARK, LIGHT, LINES, MIDDLE, STYLE, legend_below, save
+from baselines.figures.style import COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, look, save
 from baselines.identification.identified import Identified
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -14,44 +15,63 @@ CHAMBERS = ("P1", "N1", "P2", "N2")
 LAGS = 40
 """Rows up to which residuals are compared with themselves."""
 
-
-EVERY = 5
-"""Of so many rows of pressures one is drawn."""
+PARTS = 24
+"""Of a log, over each of which residuals are averaged."""
 
 
 def residuals_figure(found: Identified, folder: Path) -> list[Path]:
-    """Measured less predicted, pressures and positions, over time, and the pressures' correlation with themselves."""
+    """Measured less predicted, pressures and positions, RMS over parts of the log, and how pressures correlate."""
     windows, problem = found.fit.problem.windows, found.fit.problem
     residual = problem.settled(found.fit.theta)[1]
     count, chambers = windows.pressures.shape[0], windows.pressures.shape[1] * 4
     pressures = residual[:, :chambers].reshape(count, -1, 4) * problem.noise.pressure
     positions = residual[:, chambers:].reshape(count, -1)[:, : windows.positions.shape[1] * 2].reshape(count, -1, 2)
-    positions = positions * problem.noise.position
-    period = windows.trial.period
-    times = windows.trial.times[windows.starts][:, None] + period * np.arange(windows.length)
+    positions = positions[windows.valid] * problem.noise.position
+    period, starts = windows.trial.period, windows.trial.times[windows.starts][:, None]
+    times = starts + period * np.arange(pressures.shape[1])
+    arrived = (starts + period * windows.arrived)[windows.valid]
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(3, 1, figsize=(9, 8), layout="constrained")
-        for k, (name, colour) in enumerate(zip(CHAMBERS, (DARK, MIDDLE, ACCENT, LIGHT), strict=True)):
-            shown = times[:, ::EVERY].ravel(), pressures[:, ::EVERY, k].ravel()
-            axes[0].plot(*shown, ".", ms=1.5, color=colour, label=f"chamber {name}", rasterized=True)
+        figure, axes = plt.subplots(3, 1, figsize=(COLUMN, 5.2), layout="constrained")
+        after = 0.0
+        for k, name in enumerate(CHAMBERS):
+            style = {**look(k), "label": f"chamber {name}"}
+            axes[0].plot(*_rms(times.ravel(), pressures[..., k].ravel()), **style)
             lags, values = _correlation(pressures[..., k])
-            axes[2].plot(1e3 * period * lags, values, color=colour, ls=LINES[k], label=f"chamber {name}")
-        arrived = (windows.trial.times[windows.starts][:, None] + period * windows.arrived)[windows.valid]
-        for k, (name, colour) in enumerate((("x", DARK), ("y", MIDDLE))):
-            shown = arrived, 1e3 * positions[..., k][windows.valid]
-            axes[1].plot(*shown, ".", ms=2, color=colour, label=f"position {name}", rasterized=True)
-        axes[0].set(
-            xlabel="time (s)", ylabel="pressure residual (Pa)", title=f"measured less predicted (pressures: one row in {EVERY})"
+            after = max(after, float(np.abs(values[1:]).max()))
+            axes[2].plot(1e3 * period * lags, values, **style, markevery=4)
+        for k, name in enumerate("xy"):
+            axes[1].plot(*_rms(arrived, 1e3 * positions[:, k]), **look(k + 4), label=f"position {name}")
+        for place, noise in zip(axes, (problem.noise.pressure, 1e3 * problem.noise.position), strict=False):
+            place.axhline(noise, color="black", ls=(0, (1, 3)), label="sensors' noise")
+            place.set(xlabel="time (s)", ylim=(0, 1.2 * place.get_ylim()[1]))
+        axes[0].set(ylabel="RMS (Pa)", title="pressures, measured less predicted")
+        axes[1].set(ylabel="RMS (mm)", title="positions, measured less predicted")
+        axes[2].set(
+            xlabel="lag (ms)", ylabel="correlation (-)", ylim=(-0.3, 1.05), title="residuals of pressures with later ones"
         )
-        axes[1].set(xlabel="time (s)", ylabel="position residual (mm)")
-        axes[2].set(xlabel="lag (ms)", ylabel="correlation of residuals (-)", ylim=(-0.3, 1.05))
         limit = 1.96 / np.sqrt(pressures[..., 0].size)
         axes[2].axhspan(-limit, limit, color="#888888", alpha=0.3, lw=0, label="white noise, 95 %")
-        handles: dict[str, object] = {}
-        for one in axes:
-            handles.update({label: handle for handle, label in zip(*one.get_legend_handles_labels(), strict=True)})
-        legend_below(figure, list(handles.values()), list(handles))
+        over = [
+            np.sqrt(np.mean(pressures**2)) / problem.noise.pressure,
+            np.sqrt(np.mean(positions**2)) / problem.noise.position,
+        ]
+        headline(
+            figure,
+            f"Residuals are {over[0]:.2f} (pressures) and {over[1]:.2f} (positions) times the noise, "
+            f"and correlate with later ones by at most {after:.2g}",
+        )
+        legend_below(figure)
         return save(figure, folder, "residuals")
+
+
+def _rms(times: Array, values: Array) -> tuple[Array, Array]:
+    """Middle and root mean square of values (N,) in each of ``PARTS`` equal parts of the time that have some."""
+    edges = np.linspace(times.min(), times.max(), PARTS + 1)
+    part = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, PARTS - 1)
+    size = np.bincount(part, minlength=PARTS)
+    some = size > 0
+    square = np.bincount(part, values**2, PARTS)[some] / size[some]
+    return (edges[:-1] + edges[1:])[some] / 2, np.sqrt(square)
 
 
 def _correlation(values: Array) -> tuple[Array, Array]:
@@ -64,7 +84,7 @@ def _correlation(values: Array) -> tuple[Array, Array]:
 def intervals_figure(found: Identified, folder: Path) -> list[Path]:
     """Every parameter over the owner's value, with its 95 % interval; open circles are what the log cannot tell."""
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(figsize=(8, 0.32 * len(found.rows) + 1.2), layout="constrained")
+        figure, axes = plt.subplots(figsize=(COLUMN, 0.2 * len(found.rows) + 1.2), layout="constrained")
         for place, row in enumerate(reversed(found.rows)):
             known = row.owner or row.value or 1.0  # a latency of zero is not divided by
             _interval(axes, place, row.low / known, row.value / known, row.high / known, row.determined)
@@ -73,11 +93,19 @@ def intervals_figure(found: Identified, folder: Path) -> list[Path]:
         axes.set_yticklabels([row.name for row in reversed(found.rows)])
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter("{x:g}")
-        axes.set_title("filled: from the log, with its 95 % interval; open: kept, the log cannot tell it", loc="left")
+        told = sum(row.determined for row in found.rows)
+        headline(figure, f"The log tells {told} of {len(found.rows)} parameters")
+        for name, determined in (("from the log, with its 95 % interval", True), ("kept: the log cannot tell it", False)):
+            axes.plot([], [], "o", **_filling(determined), label=name)
+        legend_below(figure)
         return save(figure, folder, "intervals")
 
 
 def _interval(axes: Axes, place: int, low: float, middle: float, high: float, determined: bool) -> None:
-    colour = DARK if determined else MIDDLE
-    axes.plot([max(low, 1e-3), high], [place, place], color=colour, lw=1.5)
-    axes.plot(middle, place, "o", color=colour, mfc=colour if determined else "white", ms=5)
+    style = _filling(determined)
+    axes.plot([max(low, 1e-3), high], [place, place], color=style["color"], lw=1.5)
+    axes.plot(middle, place, "o", **style)
+
+
+def _filling(determined: bool) -> dict[str, Any]:
+    return {"color": DARK, "mfc": DARK} if determined else {"color": MIDDLE, "mfc": "white"}

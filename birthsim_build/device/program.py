@@ -182,9 +182,8 @@ def _way_back(
         number = before + names.index(function_name(one))
         entries.append((number, constants, len(reads), rows, len(one.rows), closes))
         sizes[closes] += len(reads)
-    takes, gives = (max(len(one.rows) + room * one.room for _, one in taped.adjoints) for room in (0, 1))
-    about = len(taped.live), len(kept), len(entries), *sizes, takes, gives
-    space = PARAMETERS + len(taped.live) + takes + gives + max(len(one.reads) for _, one in taped.adjoints)
+    about = len(taped.live), len(kept), len(entries), *sizes, *taped.most
+    space = PARAMETERS + len(taped.live) + sum(taped.most) + max(len(one.reads) for _, one in taped.adjoints)
     return writer.put(np.array([*about, *np.ravel(kept), *np.ravel(entries)], dtype=np.int64)), tuple(names), space, about
 
 

@@ -14,7 +14,7 @@ _WINDOWS = (0.02, 0.04, 0.08, 0.16)  # widths it may show by itself, m
 
 
 class Magnifier:
-    """Magnifier in the square ``box`` px, with its magnification written above; ``unit`` is the scale of line widths."""
+    """Magnifier in the square ``box`` px, its magnification and grid written above; ``unit`` is the scale of line widths."""
 
     def __init__(self, box: Box, text: Lettering, unit: float) -> None:
         self.box, self._text, self._unit = box, text, unit
@@ -37,8 +37,8 @@ class Magnifier:
         frame = Axis(centre, (1.0, 0.0))
         self._sheet.fill((255, 255, 255))
         for i in (-1, 0, 1):
-            pen.line([frame.at(i * step, -half), frame.at(i * step, half)], (236, 239, 242))
-            pen.line([frame.at(-half, i * step), frame.at(half, i * step)], (236, 239, 242))
+            pen.line([frame.at(i * step, -half), frame.at(i * step, half)], d.FAINT)
+            pen.line([frame.at(-half, i * step), frame.at(half, i * step)], d.FAINT)
         pen.curve(path_of(scene), d.PATH, 2.0 * unit)
         pen.line([compliant_target, end_effector], d.GREY, 1.2 * unit)
         size = max(3.5, 6 * unit)
@@ -47,17 +47,12 @@ class Magnifier:
         d.end_effector_marker(pen, end_effector, 0.7 * size)
         for place, colour in ((target, d.TARGET), (end_effector, d.END_EFFECTOR)):
             self._point_out(pen, frame, place, window, colour)
-        left, foot, tick = -0.46 * window, -0.46 * window, 4 / scale
-        bar = [(left, foot + tick), (left, foot), (left + step, foot), (left + step, foot + tick)]
-        pen.line([frame.at(*corner) for corner in bar], d.INK, 1.5)
         edge = 0.497 * window
         border = frame.box(-edge, edge, edge)
         pen.line([*border, border[0]], d.CAP)
         d.paste(self._sheet, picture, box)
-        at = box.x + 0.29 * box.width + 4, box.y + 0.96 * box.height + 2
-        self._text.write(picture, f"{1e3 * step:.0f} mm", at, d.INK, (0, 1), halo=True)
-        times = f"{scale / main_scale:.0f} times"
-        heading = self._text.fit((f"magnified {times}", f"{times} larger"), box.width)
+        times, grid = f"{scale / main_scale:.0f} times", f"grid {1e3 * step:.0f} mm"
+        heading = self._text.fit((f"magnified {times}, {grid}", f"{times}, {grid}", grid), box.width)
         self._text.write(picture, heading, (box.x, box.y - 2), d.INK, (0, 1))
 
     def _point_out(self, pen: Pen, frame: Axis, place: Point, window: float, colour: Colour) -> None:

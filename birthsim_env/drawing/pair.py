@@ -58,9 +58,11 @@ class Half:
         small.write(picture, "tracking error, mm", (plot.x, plot.y - 2), d.INK, (0, 1))
         for tick in self._ticks:
             small.write(picture, f"{1e3 * tick:g}", (plot.x - margin // 2, self._row(tick)), d.INK, (1, 0.5))
-        for second in range(math.ceil(self._span[0]), math.floor(self._span[1]) + 1):
-            at = self._column(second), plot.bottom + 2
-            small.write(picture, f"{second} s", at, d.INK, (0.5 if second < self._span[1] else 1, 0))
+        # Seconds stand apart, and none at either end, where the axes' own figures are.
+        begin, end = self._span
+        step = math.ceil(1.6 * small.width("10 s") * (end - begin) / plot.width)
+        for second in range(math.floor(begin) + step, math.ceil(end), step):
+            small.write(picture, f"{second} s", (self._column(second), plot.bottom + 2), d.INK, (0.5, 0))
 
     def draw(self, picture: pygame.Surface, scene: Scene, times: NDArray[np.float64], errors: NDArray[np.float64]) -> None:
         """Draw one instant, and the error (m) at all ``times`` (s) so far."""

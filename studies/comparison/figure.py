@@ -1,17 +1,16 @@
 """Figures of the bench: error in every environment, and what it costs in air."""
 
 import re
+from collections import Counter
 from pathlib import Path
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 from matplotlib import pyplot as plt
 
-from baselines.figures.runs import DARK, MIDDLE, STYLE, legend_below, save
+from baselines.figures.style import COLUMN, DARK, MIDDLE, PAGE, STYLE, headline, label_of, legend_below, log_ticks, look, save
 from studies.comparison.grid import known
 from studies.comparison.tables import CIRCLE, Figures, controllers_of
-from studies.looks import label_of, log_ticks, look
 
 CONDITIONS = {
     ("ideal", "nominal"): {"marker": "o", "color": DARK, "mfc": DARK},
@@ -40,9 +39,10 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
     names = controllers_of(figures)
     environments = list(dict.fromkeys(cell["environment"] for cell in figures))
     present = [key for key in CONDITIONS if any((cell["sensors"], cell["plant"]) == key for cell in figures)]
-    size = (1.8 + 2.0 * len(environments), 0.9 + 0.42 * len(names) + 0.15 * len(present))  # of which the legend takes the last
+    size = PAGE, 1.2 + 0.3 * len(names) + 0.12 * len(present)
     figure, panels = plt.subplots(1, len(environments), figsize=size, layout="constrained", sharey=True, squeeze=False)
-    shown: dict[str, Any] = {}
+    first = [key for key in present if key[1] != "nominal"] or present
+    least = dict[str, tuple[float, str]]()
     for axes, environment in zip(panels[0], environments, strict=True):
         here = [cell for cell in figures if cell["environment"] == environment]
         low, high = _limits(here, "settled_rms")
@@ -52,20 +52,27 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
             row = names.index(cell["controller"]) + 0.7 * ((present.index(key) + 0.5) / len(present) - 0.5)
             if np.isfinite(found["median"]):
                 axes.hlines(row, found["low"], min(found["high"], high), color=style["color"], lw=0.9)
-                shown[known(*key)] = axes.plot(found["median"], row, ls="", ms=4, **style)[0]
+                axes.plot(found["median"], row, ls="", ms=3.5, **style, label=known(*key))
+                if key == first[0]:
+                    least[environment] = min(least.get(environment, (np.inf, "")), (found["median"], cell["controller"]))
             elif np.isinf(found["median"]):
-                axes.text(high / 1.05, row, "lost", ha="right", va="center", fontsize=6, color=style["color"])
+                axes.text(high / 1.05, row, "lost", ha="right", va="center", fontsize=7, color=style["color"])
         axes.set(xscale="log", xlim=(low, high), title=re.sub(r"^BirthSIM/|-v\d+$", "", environment))
-        axes.set_xlabel("settled RMS error (mm)", fontsize=8)
-        log_ticks(axes.xaxis)
-        axes.tick_params(axis="x", labelsize=7.5)
+        axes.set_xlabel("error (mm)")
+        log_ticks(axes.xaxis, 1.0)
         axes.grid(axis="y", visible=False)
         for row in range(1, len(names)):
             axes.axhline(row - 0.5, color="black", alpha=0.15, lw=0.6)
     panels[0, 0].set_yticks(range(len(names)), [label_of(name) for name in names])
     panels[0, 0].set_ylim(len(names) - 0.5, -0.5)
-    figure.suptitle("Settled error: medians with 95 % intervals", fontsize=9.5)
-    legend_below(figure, list(shown.values()), list(shown))
+    wins = Counter(name for _, name in least.values()).most_common(1)
+    if wins:
+        name, times = wins[0]
+        headline(
+            figure,
+            f"{label_of(name)} has the least settled error in {times} of {len(environments)} environments: {known(*first[0])}",
+        )
+    legend_below(figure, said="RMS settled error: medians with 95 % intervals")
     return save(figure, folder, "settled_error")
 
 
@@ -85,9 +92,8 @@ def air_figure(figures: Figures, folder: Path) -> list[Path]:
     names = controllers_of(figures)
     sensors = list(dict.fromkeys(cell["sensors"] for cell in here))
     figure, panels = plt.subplots(
-        1, len(sensors), figsize=(1 + 4 * len(sensors), 4.8), layout="constrained", sharey=True, squeeze=False
+        1, len(sensors), figsize=(COLUMN if len(sensors) < 3 else PAGE, 4.0), layout="constrained", sharey=True, squeeze=False
     )
-    handles: dict[str, Any] = {}
     top = _limits(here, "air")[1]
     for axes, kind in zip(panels[0], sensors, strict=True):
         shown = [cell for cell in here if cell["sensors"] == kind]
@@ -98,18 +104,18 @@ def air_figure(figures: Figures, folder: Path) -> list[Path]:
             if np.isfinite([error["median"], air["median"]]).all():
                 axes.hlines(air["median"], error["low"], min(error["high"], right), color=style["color"], lw=0.9)
                 axes.vlines(error["median"], air["low"], min(air["high"], top), color=style["color"], lw=0.9)
-                handles[cell["controller"]] = axes.plot(
-                    error["median"], air["median"], ls="", ms=7, marker=style["marker"], color=style["color"]
-                )[0]
+                axes.plot(error["median"], air["median"], **style | {"linestyle": ""}, ms=5, label=label_of(cell["controller"]))
         lost = [cell["controller"] for cell in shown if np.isinf(cell["metrics"]["settled_rms"]["median"])]
         title = f"{kind} sensors" + (
-            fill(f"; not shown, for they lose episodes: {', '.join(map(label_of, lost))}", 60) if lost else ""
+            fill(f"; not shown, for they lose episodes: {', '.join(map(label_of, lost))}", 34) if lost else ""
         )
-        axes.set(xscale="log", xlim=(left, right), ylim=(0, top), xlabel="settled RMS error (mm)")
-        axes.set_title(title, loc="left", fontsize=8.5)
-        log_ticks(axes.xaxis)
+        axes.set(xscale="log", xlim=(left, right), ylim=(0, top), xlabel="settled error (mm)")
+        axes.set_title(title)
+        log_ticks(axes.xaxis, 1.0)
     panels[0, 0].set_ylabel("air used (normal l/min)")
     short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
-    figure.suptitle(f"{short}, {plant.replace('drawn-sensors', 'nominal')} plant: medians with 95 % intervals", fontsize=9.5)
-    legend_below(figure, list(handles.values()), [label_of(name) for name in handles])
+    lowest = min(here, key=lambda cell: cell["metrics"]["settled_rms"]["median"])
+    error, air = (lowest["metrics"][kind]["median"] for kind in ("settled_rms", "air"))
+    headline(figure, f"Least error: {label_of(lowest['controller'])}, {error:.2g} mm with {air:.2g} l/min")
+    legend_below(figure, said=f"{short}, {plant.replace('drawn-sensors', 'nominal')} rig: medians with 95 % intervals")
     return save(figure, folder, "air_against_error")

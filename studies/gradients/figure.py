@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib import pyplot as plt
 
-from baselines.figures.runs import ACCENT, DARK, STYLE, save
+from baselines.figures.style import ACCENT, COLUMN, DARK, STYLE, headline, legend_below, save
 
 STEPS = 5
 """Of the grid of openings: how far a chord reaches on either side."""
@@ -18,16 +18,17 @@ def friction_figure(pushed: dict[str, Any], after: float, folder: Path) -> list[
     chord = (moved[2 * STEPS :] - moved[: -2 * STEPS]) / (opening[2 * STEPS :] - opening[: -2 * STEPS])
     reach = opening[STEPS] - opening[0]
     with plt.rc_context(STYLE):
-        figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.3), layout="constrained")
-        left.plot(opening, 1e3 * moved, color=DARK, label=f"after {1e3 * after:g} ms")
+        figure, (left, right) = plt.subplots(1, 2, figsize=(COLUMN, 2.7), layout="constrained")
+        left.plot(opening, 1e3 * moved, color=DARK, ls="--", label=f"motion, and its difference over ±{reach:.2g}")
         tangents = np.arange(STEPS, len(opening), 2 * STEPS)
         ends = np.array([[-reach], [reach]])
-        left.plot(opening[tangents], 1e3 * moved[tangents], "o", ms=4, color=ACCENT, label="gradients")
-        left.plot(opening[tangents] + ends, 1e3 * (moved[tangents] + slope[tangents] * ends), color=ACCENT, lw=2.2)
-        left.set(xlabel="opening of the valves of cylinder 2", ylabel="motion of its piston (mm)")
+        left.plot(opening[tangents], 1e3 * moved[tangents], "o", color=ACCENT)
+        left.plot(opening[tangents] + ends, 1e3 * (moved[tangents] + slope[tangents] * ends), color=ACCENT, lw=2)
+        left.set(xlabel="valve opening (-)", ylabel="motion of piston 2 (mm)")
         right.plot(opening, 1e3 * slope, color=ACCENT, label="gradient")
-        right.plot(opening[STEPS:-STEPS], 1e3 * chord, color=DARK, ls="--", label=f"difference over ±{reach:.2g}")
-        right.set(xlabel="opening of the valves of cylinder 2", ylabel="mm per unit of opening")
-        for axes in (left, right):
-            axes.legend()
+        right.plot(opening[STEPS:-STEPS], 1e3 * chord, color=DARK, ls="--")
+        right.set(xlabel="valve opening (-)", ylabel="slope (mm)")
+        rest, most = 1e3 * slope[np.argmin(np.abs(opening))], 1e3 * slope.max()
+        headline(figure, f"Friction flattens the gradient at rest: {rest:.2g} instead of {most:.2g} mm per unit of opening")
+        legend_below(figure, said=f"after {1e3 * after:g} ms")
         return save(figure, folder, "gradients_friction")

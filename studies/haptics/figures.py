@@ -6,22 +6,36 @@ from typing import Any
 
 import numpy as np
 from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
+from baselines.figures.style import (
+    ACCENT,
+    COLOURS,
+    COLUMN,
+    LINES,
+    PAGE,
+    STYLE,
+    headline,
+    label_of,
+    legend_below,
+    log_ticks,
+    look,
+    save,
+)
 from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics import coupled
-from studies.haptics.coupled import stable_up_to
 from studies.haptics.kept import PEAK
 from studies.haptics.release import PULL, STIFFNESS
-from studies.looks import label_of, log_ticks, look
 from studies.stability.figure import stability_figure
 
 Runs = Sequence[dict[str, Any]]
 
-COLOURS = (DARK, MIDDLE, "#8e5ea2", "#b8860b")
+LOOKS = tuple({"color": COLOURS[k], "ls": LINES[j]} for k, j in ((0, 0), (1, 2), (5, 3), (4, 0)))
 """Of the kinds of sensors."""
+
+
+SEEN = 1e-3
+"""mm: smaller motions are drawn as that."""
 
 
 def haptic_figures(runs: Runs, folder: Path) -> list[Path]:
@@ -40,76 +54,95 @@ def haptic_figures(runs: Runs, folder: Path) -> list[Path]:
 
 def bode_figure(runs: Runs, folder: Path) -> list[Path]:
     """Magnitude and phase felt under multisines of ``PEAK``, median and quartiles over lanes, beside those declared."""
-    laws = _laws(runs)
+    laws, off = _laws(runs), dict[str, float]()
     with plt.rc_context(STYLE):
         figure, panels = _panels(2, len(laws))
         for column, law in enumerate(laws):
             above, below = panels[:, column]
-            for colour, run in zip(COLOURS, _of(runs, law), strict=False):
+            for style, run in zip(LOOKS, _of(runs, law), strict=False):
                 stiffness, curves = _curves(run)
                 for axes, name in ((above, "magnitude"), (below, "phase")):
                     low, middle, high = _numbers(curves[name])
-                    axes.fill_between(curves["frequency"], low, high, color=colour, alpha=0.2, lw=0)
-                    axes.plot(curves["frequency"], middle, color=colour, label=run["sensors"])
+                    axes.fill_between(curves["frequency"], low, high, color=style["color"], alpha=0.2, lw=0)
+                    axes.plot(curves["frequency"], middle, **style, label=f"{run['sensors']} sensors")
+                    if name == "magnitude" and curves["declared"] is not None:
+                        ratio = np.exp(np.nanmean(np.abs(np.log(middle / _numbers(curves["declared"][name])))))
+                        off[law] = max(off.get(law, 1.0), float(ratio))
             for axes, name in ((above, "magnitude"), (below, "phase")):
                 if curves["declared"] is not None:
-                    axes.plot(curves["frequency"], curves["declared"][name], color=ACCENT, ls="--", lw=2, label="declared")
+                    axes.plot(curves["frequency"], curves["declared"][name], color=ACCENT, ls="--", lw=1.6, label="declared")
                 axes.set_xscale("log")
-                log_ticks(axes.xaxis)
+                log_ticks(axes.xaxis, 1.0, 3.0)
             above.set(yscale="log", ylim=(300, 3e5))
             below.set(xlabel="frequency (Hz)", ylim=(-60, 330), yticks=range(0, 271, 90))
-            above.set_title(label_of(law), loc="left")
+            above.set_title(label_of(law))
         panels[0, 0].set_ylabel("force over displacement (N/m)")
         panels[1, 0].set_ylabel("phase (degrees)")
-        figure.suptitle(f"Impedance felt at {stiffness:g} N/m by a hand of {PEAK:g} N: median and quartiles", fontsize=10)
-        return _finished(figure, panels[0], folder, "haptics_impedance")
+        if off:
+            best = min(off, key=off.__getitem__)
+            headline(figure, f"{label_of(best)} feels most as declared: within a factor of {off[best]:.2g} on average")
+        legend_below(figure, said=f"{stiffness:g} N/m, hand of {PEAK:g} N: median and quartiles")
+        return save(figure, folder, "haptics_impedance")
 
 
 def energy_figure(runs: Runs, folder: Path) -> list[Path]:
     """Energy that the worst lane has given to the hand, and the damping at the port over frequency."""
-    laws = _laws(runs)
+    laws, most = _laws(runs), dict[str, float]()
     with plt.rc_context(STYLE):
         figure, panels = _panels(2, len(laws))
         for column, law in enumerate(laws):
             above, below = panels[:, column]
-            for colour, run in zip(COLOURS, _of(runs, law), strict=False):
+            for style, run in zip(LOOKS, _of(runs, law), strict=False):
                 stiffness, curves = _curves(run)
                 energy, (middle, least) = _numbers(curves["energy"]), _numbers(curves["damping"])
-                above.plot(np.arange(len(energy)) * curves["energy_period"], energy, color=colour, label=run["sensors"])
-                below.plot(curves["frequency"], middle, color=colour)
-                below.plot(curves["frequency"], least, color=colour, ls=":")
-            above.axhline(0, color="grey", lw=0.8)
-            below.axhline(0, color="grey", lw=0.8)
+                above.plot(np.arange(len(energy)) * curves["energy_period"], energy, **style, label=f"{run['sensors']} sensors")
+                below.plot(curves["frequency"], middle, **style)
+                below.plot(curves["frequency"], least, **style, lw=0.6)
+                most[f"{label_of(law)} with {run['sensors']} sensors"] = float(energy[-1])
+            above.axhline(0, color="black", lw=0.6)
+            below.axhline(0, color="black", lw=0.6)
             above.set(xlabel="time (s)")
             below.set(xscale="log", xlabel="frequency (Hz)")
             below.set_yscale("symlog", linthresh=30)
-            log_ticks(below.xaxis)
-            above.set_title(label_of(law), loc="left")
+            below.set_yticks([-1000, -100, 0, 100, 1000])
+            log_ticks(below.xaxis, 1.0, 3.0)
+            above.set_title(label_of(law))
         panels[0, 0].set_ylabel("energy given, worst lane (J)")
-        panels[1, 0].set_ylabel("port damping (N s/m)\nmedian, and dotted the least")
-        figure.suptitle(f"Energy at the port, {stiffness:g} N/m, hand of {PEAK:g} N; below zero it takes", fontsize=10)
-        return _finished(figure, panels[0], folder, "haptics_energy")
+        panels[1, 0].set_ylabel("port damping (N s/m)")
+        name = max(most, key=most.__getitem__)
+        finding = (
+            f"{name} has given the hand {most[name]:.2g} J" if most[name] > 0 else "Every controller takes energy from the hand"
+        )
+        headline(figure, f"{finding} in the end")
+        legend_below(figure, said=f"{stiffness:g} N/m, hand of {PEAK:g} N; damping: median, and thin the least of the lanes")
+        return save(figure, folder, "haptics_energy")
 
 
 def release_figure(runs: Runs, folder: Path) -> list[Path]:
     """Displacement along a pull that is let go: median, and the range over lanes."""
-    laws = _laws(runs)
+    laws, beyond = _laws(runs), dict[str, float]()
     with plt.rc_context(STYLE):
-        figure, panels = _panels(1, len(laws), height=3.6)
+        figure, panels = _panels(1, len(laws), height=2.6)
         for axes, law in zip(panels[0], laws, strict=True):
-            for colour, run in zip(COLOURS, _of(runs, law), strict=False):
+            for style, run in zip(LOOKS, _of(runs, law), strict=False):
                 curves = run["release"][0]["curves"]
                 middle, least, largest = _numbers(curves["offset_mm"])
-                axes.plot(curves["time"], middle, color=colour, label=run["sensors"])
-                axes.fill_between(curves["time"], least, largest, color=colour, alpha=0.2, lw=0)
+                axes.plot(curves["time"], middle, **style, label=f"{run['sensors']} sensors")
+                axes.fill_between(curves["time"], least, largest, color=style["color"], alpha=0.2, lw=0)
+                beyond[law] = max(beyond.get(law, 0.0), -float(np.nanmin(middle)))
             if curves["declared"] is not None:
-                axes.plot(curves["time"], curves["declared"], color=ACCENT, ls="--", lw=2, label="declared")
-            axes.set(xlabel="time since the hand let go (s)")
-            axes.axhline(0, color="grey", lw=0.8)
-            axes.set_title(label_of(law), loc="left")
-        panels[0, 0].set_ylabel("displacement along the pull (mm)")
-        figure.suptitle(f"{PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m: median and range", fontsize=10)
-        return _finished(figure, panels[0], folder, "haptics_release")
+                axes.plot(curves["time"], curves["declared"], color=ACCENT, ls="--", lw=1.6, label="declared")
+            axes.set(xlabel="time since release (s)")
+            axes.axhline(0, color="black", lw=0.6)
+            axes.set_title(label_of(law))
+        panels[0, 0].set_ylabel("displacement (mm)")
+        best, worst = min(beyond, key=beyond.__getitem__), max(beyond, key=beyond.__getitem__)
+        headline(
+            figure,
+            f"Let go, {label_of(best)} overshoots by {beyond[best]:.2g} mm and {label_of(worst)} by {beyond[worst]:.2g} mm",
+        )
+        legend_below(figure, said=f"{PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m: median and range")
+        return save(figure, folder, "haptics_release")
 
 
 def hand_figures(runs: Runs, folder: Path) -> list[Path]:
@@ -128,37 +161,34 @@ def hand_figures(runs: Runs, folder: Path) -> list[Path]:
 
 
 def z_width_figure(runs: Runs, folder: Path) -> list[Path]:
-    """The stiffest setpoint that is stable against every hand, over damping in units of the law's own."""
-    kinds = list(dict.fromkeys(run["sensors"] for run in runs))
+    """Motion that the worst hand leaves, over the setpoint, with the damping that makes most setpoints stable."""
+    kinds, asked, always = list(dict.fromkeys(run["sensors"] for run in runs)), 1e-3 * np.array(coupled.ASKED), list[str]()
     with plt.rc_context(STYLE):
-        figure, panels = _panels(1, len(kinds), height=3.8, width=4.2)
-        for axes, sensors in zip(panels[0], kinds, strict=True):
+        figure, panels = plt.subplots(
+            len(kinds), 1, figsize=(COLUMN, 1.7 * len(kinds) + 1.2), layout="constrained", sharex=True, squeeze=False
+        )
+        for axes, sensors in zip(panels[:, 0], kinds, strict=True):
             for k, law in enumerate(_laws(runs)):
                 ((piece,),) = (run["z_width"] for run in _of(runs, law) if run["sensors"] == sensors)
-                # Some laws have equal limits: a small shift keeps every marker in sight.
-                limits = 1e-3 * np.array(stable_up_to(piece)) + 0.12 * k
-                axes.plot(piece["factors"], limits, label=label_of(law), ms=6, **look(k))
-            axes.set(xlabel="damping, times the law's own", ylim=(-0.5, 1e-3 * max(coupled.ASKED) + 1))
-            axes.set_title(f"{sensors} sensors", loc="left")
-        panels[0, 0].set_ylabel("stable up to (kN/m); 0: nowhere, 20: all")
-        figure.suptitle(f"Z-width: stiffness that is stable against each of {len(coupled.HANDS)} hands", fontsize=10)
-        return _finished(figure, panels[0], folder, "haptics_z_width")
+                motion, stable = np.maximum(_numbers(piece["motion_mm"]), SEEN), np.array(piece["stable"]) == True  # noqa: E712 - refused: None
+                best = max(range(len(stable)), key=lambda row: (stable[row].sum(), -np.nansum(motion[row])))
+                axes.plot(asked, motion[best], **look(k), mfc="white", label=label_of(law))
+                axes.plot(asked[stable[best]], motion[best][stable[best]], **look(k) | {"linestyle": ""})
+                always += [f"{label_of(law)} with {sensors} sensors"] * bool(stable[best].all())
+            axes.set(xscale="log", yscale="log", ylabel="motion that remains (mm)", title=f"{sensors} sensors")
+            axes.set_xticks(asked, [f"{value:g}" for value in asked], minor=False)
+            axes.minorticks_off()
+            log_ticks(axes.yaxis, 1.0)
+        panels[-1, 0].set_xlabel("stiffness setpoint (kN/m)")
+        headline(figure, f"Stable at every stiffness, against every hand: {', '.join(always) or 'no controller'}")
+        legend_below(figure, said=f"worst of {len(coupled.HANDS)} hands, best damping; filled: stable")
+        return save(figure, folder, "haptics_z_width")
 
 
-def _panels(rows: int, columns: int, height: float = 6.0, width: float = 3.4) -> tuple[Figure, Any]:
-    size = (max(5.0, width * columns + 0.6), height)
+def _panels(rows: int, columns: int, height: float = 4.0) -> tuple[Figure, Any]:
+    size = (PAGE if columns > 2 else COLUMN, height)
     figure, panels = plt.subplots(rows, columns, figsize=size, layout="constrained", sharey="row", squeeze=False)
     return figure, panels
-
-
-def _finished(figure: Figure, labelled: Sequence[Axes], folder: Path, name: str) -> list[Path]:
-    """With one legend of all labels below."""
-    found: dict[str, Any] = {}
-    for axes in labelled:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    legend_below(figure, list(found.values()), list(found))
-    return save(figure, folder, name)
 
 
 def _laws(runs: Runs) -> list[str]:

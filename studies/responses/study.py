@@ -31,8 +31,8 @@ time."""
 STIFFNESS = {"low": (3500.0, 1900.0), "high": (5200.0, 2700.0)}
 """N/m of the cylinders, as (9) counts it."""
 
-FRICTION = {"sliding": "-", "stuck": "--"}
-"""What the pistons do, and how it is drawn."""
+FRICTION = ("sliding", "stuck")
+"""What the pistons do."""
 
 CURVES: dict[str, tuple[str, float, str, dict[str, float], bool]] = {
     "hand Fx to x": ("mm/N", 1e3, "x", {"Fx": 1.0}, False),
@@ -112,23 +112,9 @@ def _shown(content: Content) -> dict[str, str]:
 
 def _drawn(content: Content, folder: Path) -> list[Path]:
     # pyplot takes half a second to load.
-    from matplotlib import pyplot as plt
+    from studies.responses.figure import responses_figure
 
-    from baselines.figures.runs import ACCENT, DARK, STYLE, legend_below, save
-
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, len(CURVES), figsize=(14, 6), sharex=True, layout="constrained")
-        for (above, below), (title, curves) in zip(axes.T, content["figures"].items(), strict=True):
-            for one in curves:
-                look = {"ls": FRICTION[one["friction"]], "color": DARK if one["stiffness"] == "low" else ACCENT}
-                label = f"{one['friction']}, {one['stiffness']} stiffness"
-                above.loglog(FREQUENCY[::DRAWN], one["magnitude"], label=label, **look)
-                below.semilogx(FREQUENCY[::DRAWN], one["phase"], **look)
-            above.set_title(title, loc="left")
-            above.set_ylabel(CURVES[title][0])
-            below.set(xlabel="frequency (Hz)", ylabel="phase (degrees)")
-        legend_below(figure, *axes[0, 0].get_legend_handles_labels())
-        return save(figure, folder, "frequency_responses")
+    return responses_figure(content["figures"], folder)
 
 
 STUDY = Study(

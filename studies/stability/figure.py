@@ -1,6 +1,7 @@
 """Figures of the stability maps: filled cells for what remains of a push, and the border of what is stable."""
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -9,29 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, NullFormatter
 
-from baselines.figures.runs import ACCENT, DARK, STYLE, legend_below, save
+from baselines.figures.style import ACCENT, DARK, LOST, PAGE, STYLE, headline, label_of, legend_below, log_ticks, save
 from birthsim_env.physics.compiled.lanes import Array
-from studies.looks import label_of
 
 RANGE = (0.01, 100.0)
 """mm, of the colours."""
-
-LOST_COLOUR = "#303030"
 
 
 def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Path) -> list[Path]:
     """One map of ``studies.stability.maps.draw_map``, a panel per variant; ``heading`` names controller and sensors."""
     count = len(chart["variants"])
     with plt.rc_context({**STYLE, "axes.grid": False}):
-        width = max(4.6, 3.7 * count)
-        figure, panels = plt.subplots(1, count, figsize=(width, 4.3), layout="constrained", sharey=True, squeeze=False)
+        figure, panels = plt.subplots(1, count, figsize=(PAGE, 2.9), layout="constrained", sharey=True, squeeze=False)
         across, up = (_edges(_places(chart[side]), chart[side]["logarithmic"]) for side in "xy")
         lost = False
         for axes, (label, found) in zip(panels[0], chart["variants"].items(), strict=True):
             motion, stable = np.array(found["motion_mm"], dtype=float), np.array(found["stable"])
-            axes.set_facecolor(LOST_COLOUR)
+            axes.set_facecolor(LOST)
             lost |= bool(np.isnan(motion).any())
             drawn = axes.pcolormesh(
                 across, up, np.clip(motion, *RANGE), norm=LogNorm(*RANGE), cmap="YlOrBr", edgecolors="white", lw=0.3
@@ -41,26 +37,26 @@ def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Pat
             for side, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
                 if chart[side]["logarithmic"]:
                     getattr(axes, f"set_{side}scale")("log")
-                    axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-                    axis.set_major_formatter("{x:g}")
-                    axis.set_minor_formatter(NullFormatter())
+                    log_ticks(axis, 1.0)
                     if chart[side]["values"][0] == 0.0:
-                        axis.set_ticks(_places(chart[side]), [f"{value:g}" for value in chart[side]["values"]])
+                        axis.set_ticks(_places(chart[side])[::3], [f"{value:g}" for value in chart[side]["values"][::3]])
                         axis.set_ticks([], minor=True)
             axes.set(xlabel=chart["x"]["label"], xlim=across[[0, -1]], ylim=up[[0, -1]])
-            axes.set_title(f"{label_of(label)}\n{100 * stable.mean():.0f} % of the cells stable", loc="left", fontsize=8.5)
-        panels[0, 0].set_ylabel(chart["y"]["label"])
+            axes.set_title(f"{label_of(label)}\n{100 * stable.mean():.0f} % of the cells stable")
+        panels[0, 0].set_ylabel(fill(chart["y"]["label"], 30))
         bar = figure.colorbar(drawn, ax=panels, pad=0.015, extend="both")
-        bar.set_label("motion that remains, peak to peak (mm)")
+        bar.set_label("motion that remains (mm)")
         bar.ax.yaxis.set_major_formatter("{x:g}")
         handles: list[Any] = [Line2D([], [], color=DARK, lw=2, label="border of what is stable")]
         if any(place is not None for place in chart["believed"]):
             look = {"ls": "--"} if None in chart["believed"] else {"ls": "", "marker": "*", "ms": 11}
             handles.append(Line2D([], [], color=ACCENT, label="what the controller believes", **look))
         if lost:
-            handles.append(Patch(color=LOST_COLOUR, label="lost: ran into a stop"))
-        legend_below(figure, handles, [str(handle.get_label()) for handle in handles])
-        figure.suptitle(f"{chart['title']}: {heading}", fontsize=9.5)
+            handles.append(Patch(color=LOST, label="lost: ran into a stop"))
+        share = {label: 100 * float(np.mean(found["stable"])) for label, found in chart["variants"].items()}
+        best = max(share, key=share.__getitem__)
+        headline(figure, f"{chart['title']}, {heading}: at most {share[best]:.0f} % of the cells are stable ({label_of(best)})")
+        legend_below(figure, said="motion peak to peak after a push", also=handles)
         return save(figure, folder, f"stability_{name}")
 
 

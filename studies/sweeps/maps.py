@@ -11,13 +11,11 @@ from matplotlib.patches import Patch
 
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number
-from baselines.figures.runs import STYLE, legend_below, save
+from baselines.figures.style import COLUMN, LOST, PAGE, STYLE, headline, label_of, legend_below, log_ticks, save
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import field_of
 from studies.sweeps.plan import HeatMap
 from studies.sweeps.report import as_float, short
-
-LOST_COLOUR = "#303030"
 
 WRITTEN = 150
 """Cells of a panel that still have room for their figures."""
@@ -33,19 +31,21 @@ def draw_map(name: str, chart: HeatMap, found: Sequence[dict[str, Any]], folder:
     norm = LogNorm(low, high) if low > 0 and high > 5 * low else Normalize(low, high)
     with plt.rc_context({**STYLE, "axes.grid": False}):
         figure, axes = plt.subplots(
-            1, len(panels), figsize=(max(4.6, 3.7 * len(panels)), 4.0), layout="constrained", sharey=True, squeeze=False
+            1, len(panels), figsize=(COLUMN if len(panels) < 2 else PAGE, 2.9), layout="constrained", sharey=True, squeeze=False
         )
         for place, panel, rows, size in zip(axes[0], panels, shown, values, strict=True):
             x, y = (_places([row["point"].get(side) for row in rows]) for side in (chart.x, chart.y))
             drawn = _panel(place, x, y, size, norm)
-            place.set(xlabel=_label(chart.x), title="" if panel is None else f"{chart.per} = {short(panel)}")
+            place.set(xlabel=_label(chart.x), title="" if panel is None else f"{chart.per} = {label_of(short(panel))}")
         axes[0, 0].set_ylabel(_label(chart.y))
         bar = figure.colorbar(drawn, ax=axes, pad=0.015)
-        bar.set_label(f"{chart.metric}, {chart.statistic} ({UNITS[chart.metric]})")
-        bar.ax.yaxis.set_major_formatter("{x:g}")
-        bar.ax.yaxis.set_minor_formatter("{x:g}")
+        metric, unit = chart.metric.replace("rms", "RMS error").replace("_", " "), UNITS[chart.metric]
+        bar.set_label(f"{metric}, {chart.statistic} ({unit})")
+        if isinstance(norm, LogNorm):
+            log_ticks(bar.ax.yaxis)
+        headline(figure, f"{metric[0].upper()}{metric[1:]}: {low:.2g} to {high:.2g} {unit}")
         if any(np.isinf(size).any() for size in values):
-            legend_below(figure, [Patch(color=LOST_COLOUR)], ["infinite: so many episodes were lost"])
+            legend_below(figure, also=[Patch(color=LOST, label="infinite: so many episodes were lost")])
         return save(figure, folder, name)
 
 
@@ -54,14 +54,14 @@ def _panel(axes: Any, x: tuple[Array, list[str]], y: tuple[Array, list[str]], si
     (across, columns), (up, rows) = x, y
     if len(columns) * len(rows) > len(size):
         lost = np.isinf(size)
-        axes.scatter(across[lost], up[lost], color=LOST_COLOUR, marker="x")
+        axes.scatter(across[lost], up[lost], color=LOST, marker="x")
         return axes.scatter(across[~lost], up[~lost], c=size[~lost], ec="0.4", lw=0.4, **look)
     cells = np.full((len(rows), len(columns)), np.nan)
     at = np.unique(across, return_inverse=True)[1], np.unique(up, return_inverse=True)[1]
     for i in range(len(rows)):
         for j in range(len(columns)):
             cells[i, j] = size[(at[0] == j) & (at[1] == i)].mean()
-    axes.set_facecolor(LOST_COLOUR)
+    axes.set_facecolor(LOST)
     drawn = axes.pcolormesh(
         np.arange(len(columns) + 1), np.arange(len(rows) + 1), np.where(np.isinf(cells), np.nan, cells), ec="white", **look
     )
@@ -86,4 +86,8 @@ def _places(values: Sequence[Any]) -> tuple[Array, list[str]]:
 def _label(name: str) -> str:
     """A name with its unit, where it is a parameter of the rig."""
     group, _, rest = name.partition(".")
-    return f"{rest.replace('_', ' ')} ({field_of(rest).metadata['unit']})" if group in ("rig", "believed") else name
+    return (
+        f"{rest.replace('_', ' ').replace('.', ': ')} ({field_of(rest).metadata['unit']})"
+        if group in ("rig", "believed")
+        else name
+    )

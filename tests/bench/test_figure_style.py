@@ -1,4 +1,4 @@
-"""What every figure has in common: both formats, the same bytes again, and lines that a grey print tells apart."""
+"""What every figure has in common: the style, both formats, the same bytes again, and lines that a grey print tells apart."""
 
 import json
 import re
@@ -13,12 +13,17 @@ from PIL import Image
 
 from agents.reports.correction_figure import draw_corrections
 from agents.reports.learning_curves import draw_learning_curves
-from baselines.figures import runs as figures
-from baselines.figures.runs import save
+from baselines.bench.evaluation import Evaluation
+from baselines.figures import style
+from baselines.figures.runs import episode_figure, error_over_time, figure4
+from baselines.figures.style import COLOURS, headline, legend_below, look, save
 from studies.comparison.figure import CONDITIONS, draw_comparison
 from studies.comparison.stiffness_figures import draw_studies
-from studies.looks import COLOURS, look
+from studies.results import read_result
+from studies.shelf import declared, names
 from studies.stability.figure import stability_figure
+from studies.study import no_pictures
+from tests.figures import caught, contrast
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -61,7 +66,26 @@ def stability(folder):
     )
 
 
+def record():
+    """A run of Fig. 4, and rows of an episode."""
+    time = np.linspace(0, 16, 65)
+    way = np.stack([np.cos(time), np.sin(time)], axis=1)
+    pairs = {"user_force": 30.0, "target": 0.05, "compliant_target": 0.05, "position": 0.051, "tracking_error": 1e-3}
+    stiffness = {"stiffness_setpoint": 2000.0, "pneumatic_stiffness": 4000.0, "pneumatic_stiffness_setpoint": 4000.0}
+    whole = {name: np.where(time < 8, value, 2 * value)[:, None] + np.zeros(2) for name, value in stiffness.items()}
+    return {"time": time, "since_jump": time % 1, **{name: value * way for name, value in pairs.items()}, **whole}
+
+
+def controllers(folder):
+    traces = [[np.full((50, 4, 2), 1e-3 * (k + 1))] for k in range(8)]
+    evaluations = [Evaluation(f"controller-of-my-own-{k}", traces=trace) for k, trace in enumerate(traces)]
+    return error_over_time(evaluations, "BirthSIM/Circle-v1, 4 episodes from seed 0, ideal sensors, --randomize all", folder)
+
+
 DRAWINGS = {
+    "figure4": (lambda folder: figure4(record(), folder), {"figure4"}),
+    "episode": (lambda folder: episode_figure(record(), "BirthSIM/Circle-v1, pid, seed 0, lab sensors", folder), {"episode"}),
+    "controllers": (controllers, {"error_over_time"}),
     "comparison": (
         lambda folder: draw_comparison([cell(name, *where) for name in ("one", "other") for where in CONDITIONS], folder),
         {"settled_error", "air_against_error"},
@@ -75,6 +99,9 @@ DRAWINGS = {
     ),
 }
 
+
+MANY = ("comparison", "learned", "stability", "stiffness")
+"""Studies whose figures ``DRAWINGS`` has too, with fewer figures."""
 
 LONG = ("learning", "studies", "comparison", "stability")
 """Figures that take seconds to draw twice."""
@@ -102,29 +129,72 @@ def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, names, tmp_pa
 
 
 @pytest.mark.parametrize(("draw", "names"), DRAWINGS.values(), ids=DRAWINGS)
-def test_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
-    drawn = []
-    drawing = ("studies.comparison.figure", "studies.comparison.stiffness_figures", "studies.stability.figure",
-               "agents.reports.learning_curves", "agents.reports.correction_figure")  # fmt: skip
-    for module in drawing:
-        monkeypatch.setattr(f"{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
+def test_every_figure_has_the_style_and_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
+    drawn = caught(monkeypatch)
     draw(tmp_path)
     assert len(drawn) == len(names)
-    for figure in drawn:
+    assert {figure.get_suptitle(): wrong for figure, wrong in drawn if wrong} == {}
+    for figure, _ in drawn:
         labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
-        labels += [text.get_text() for text in figure.texts]
-        unitless = [
-            label for label in labels if not re.search(r"\((mm|%|N|N/m|kg|million|normal l/min)\)|N/m|%|fraction", label)
-        ]
-        titles = {figure.get_suptitle()}
-        assert set(unitless) <= titles
-        plt.close(figure)
+        assert [label for label in labels if not re.search(r"\((mm|%|N|N/m|kg|s|million|normal l/min)\)|% of", label)] == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in MANY))
+        for name in names()
+        if declared(name).draw is not no_pictures
+    ],
+)
+def test_every_figure_of_a_result_has_the_style(name, tmp_path, monkeypatch):
+    drawn = caught(monkeypatch)
+    declared(name).draw(read_result(name), tmp_path)
+    assert drawn
+    assert {figure.get_suptitle(): wrong for figure, wrong in drawn if wrong} == {}
+
+
+def test_what_the_style_forbids_is_found(tmp_path, monkeypatch):
+    drawn = caught(monkeypatch)
+    figure, axes = plt.subplots()
+    axes.plot([0, 1], color="yellow", label="one")
+    axes.plot([1, 0], color="black", label="other")
+    axes.set_title("small", fontsize=5)
+    axes.legend()
+    axes.text(0, 0, "fine")
+    figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
+    save(figure, tmp_path, "poor")
+    assert sorted(drawn[0][1]) == [
+        "5 pt: small", "a legend lies on axes", "cut off: a text that leaves the figure on its right side",
+        "neither a column nor a page wide", "no finding as title", "one and other differ in colour alone",
+        "yellow: contrast 1.1",
+    ]  # fmt: skip
+    assert contrast("black") == pytest.approx(21)
+    assert contrast("#767676") == pytest.approx(4.54, abs=0.01)
+
+
+def test_a_headline_keeps_units_beside_their_numbers():
+    figure = plt.figure(figsize=(style.COLUMN, 2))
+    headline(figure, "An error of this length, which fills a line 12 mm")
+    assert figure.get_suptitle().splitlines()[-1].endswith("12\N{NO-BREAK SPACE}mm")
+    plt.close(figure)
+
+
+def test_a_legend_has_a_label_once():
+    figure, panels = plt.subplots(1, 2)
+    for axes in panels:
+        axes.plot([0, 1], label="same")
+    legend_below(figure, said="heading", also=panels[0].plot([1, 0], label="also"))
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["same", "also"]
+    assert legend.get_title().get_text() == "heading"
+    plt.close(figure)
 
 
 def test_the_four_main_colours_lie_far_apart_in_grey():
-    shades = sorted(grey(colour) for colour in (figures.DARK, figures.MIDDLE, figures.ACCENT, figures.LIGHT))
+    shades = sorted(grey(colour) for colour in COLOURS[:4])
     assert np.diff(shades).min() > 0.12
-    assert shades[-1] < 0.72, "the lightest must still be seen on white"
+    assert min(map(contrast, COLOURS)) > 3
 
 
 def test_controllers_that_look_alike_in_grey_differ_in_marker_and_those_of_one_colour_in_line_too():

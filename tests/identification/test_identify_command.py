@@ -10,6 +10,7 @@ from baselines.identification.identified import REMEMBER, Identified
 from baselines.identification.identified import identify as identify_trial
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from tests.console import call
+from tests.figures import caught
 from tests.identification.trials import OWNER, TRUE, part, trial
 
 
@@ -35,8 +36,9 @@ def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
 
     log, out, report = tmp_path / "log.parquet", tmp_path / "rig.toml", tmp_path / "report"
     write_trial(trial(), log, TRUE)
+    drawn = caught(monkeypatch, written=True)
     status, printed, _ = call("identify", monkeypatch, capsys, log, "--out", out, "--report", report)
-    assert status == 0
+    assert (status, [wrong for _, wrong in drawn]) == (0, [[], []])
     found = Parameters.from_toml(out)
     assert found.mechanics.mass == pytest.approx(3.6, rel=5e-3)
     assert found.electronics.pressure_noise == pytest.approx(500, rel=0.05)

@@ -66,13 +66,14 @@ def _forward(
 
 @kernel
 def _backward(
-    entries: Whole, touched: Whole, periods: int, first: int, last: int, rig: Array, tape: Array, bars: Array, most: Whole
-) -> None:
+    entries: Whole, touched: Whole, periods: int, first: int, last: int, rig: Array, tape: Array, bars: Array, takes: int,
+    gives: int,
+) -> None:  # fmt: skip
     """``entries`` (E, 6): address of an adjoint, of its constants, rows that it reads from the tape, where its rows stand in
-    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back. ``most`` (2,): rows that an
-    adjoint takes, and that it needs for what it gives."""
+    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back. An adjoint ``takes`` so many
+    rows at most, and needs so many for what it ``gives``."""
     space, p = np.empty((bars.shape[0], BLOCK)), np.empty((at.PARAMETERS, BLOCK))
-    given, result = np.zeros((most[0], BLOCK)), np.zeros((most[1], BLOCK))
+    given, result = np.zeros((takes, BLOCK)), np.zeros((gives, BLOCK))
     for start in range(first, last, BLOCK):
         n, place = min(BLOCK, last - start), tape.shape[1]
         for row in range(bars.shape[0]):
@@ -143,8 +144,7 @@ class TapedLoop(Loop):
             touched += [at[row] for row in one.rows]
         self._keeps, self._entries = np.array(kept, dtype=np.int64), np.array(entries, dtype=np.int64)
         self._reads, self._touched = np.array(reads, dtype=np.int64).reshape(-1, 2), np.array(touched, dtype=np.int64)
-        sizes = [(len(one.rows), len(one.rows) + one.room) for _, one in adjoints]
-        self._most = np.array(sizes, dtype=np.int64).max(axis=0)
+        self.most = tuple(max(len(one.rows) + room * one.room for _, one in adjoints) for room in (0, 1))
 
     def new_tape(self, periods: int) -> Array:
         """Room for ``periods`` control periods, the last one with what closes it."""
@@ -165,7 +165,7 @@ class TapedLoop(Loop):
         """Take ``bars``, gradients to the live rows at the end (rows, N), to the beginning."""
 
         def work(periods: int, first: int, last: int) -> int:
-            _backward(self._entries, self._touched, periods, first, last, rig, tape, bars, self._most)
+            _backward(self._entries, self._touched, periods, first, last, rig, tape, bars, *self.most)
             return 0
 
         self._spread(work, periods, threads)

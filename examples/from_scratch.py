@@ -1,6 +1,6 @@
-"""How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, draws their curves.
+"""How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, prints their scores.
 
-python examples/learning_curves.py --out out/scratch       needs pip install 'birthsim[agents]'; a run of 1 million steps
+python examples/from_scratch.py --out out/scratch          needs pip install 'birthsim[agents]'; a run of 1 million steps
                                                            takes minutes; what --out holds is kept
 """
 
@@ -11,11 +11,9 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from tqdm import tqdm
 
-import birthsim_env
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 HERE = Path(__file__).resolve().parent
@@ -54,27 +52,7 @@ if __name__ == "__main__":
     ]  # fmt: skip
     with ThreadPoolExecutor(arguments.jobs) as pool:
         curves = list(tqdm(pool.map(run, jobs), total=len(jobs), unit=" trainings"))
-    figure, panels = plt.subplots(
-        2, len(arguments.env), figsize=(1 + 2.6 * len(arguments.env), 4.6), sharex=True, sharey="row", squeeze=False,
-        layout="constrained",
-    )  # fmt: skip
     print(f"{'environment':22}{'algorithm':20}{'seed':>5}{'steps of the first':>20}{'and last episodes':>19}{'score':>8}")
     for (name, environment, seed, *_), curve in zip(jobs, curves, strict=True):
-        above, below = panels[:, arguments.env.index(environment)]
-        style = {"color": "#c25" if name == "CleanRL" else "#058", "ls": "-" if seed == 0 else ":", "label": name}
-        above.plot(curve[:, 0] / 1e6, curve[:, 2], **style)
-        below.plot(curve[:, 0] / 1e6, curve[:, 1] / 100, **style)
         print(f"{environment:22}{name:20}{seed:5}{curve[0, 1]:20.0f}{curve[-1, 1]:19.0f}{curve[-1, 2]:8.0f}")
-    for environment, (above, below) in zip(arguments.env, panels.T, strict=True):
-        known = birthsim_env.reference_scores(environment)
-        for role, ls in (("shut valves", ":"), ("paper's law", "--"), ("best classical law", "-")):
-            score = birthsim_env.normalized_score(environment, known[role]["return"])
-            above.axhline(score, color="0.5", lw=0.8, ls=ls, label=role)
-        above.set(title=environment.removeprefix("BirthSIM/"), ylim=(-250, 120))
-        below.set(xlabel="million steps", ylim=0)
-    panels[0, 0].set_ylabel("score (shut valves 0,\nbest law 100)")
-    panels[1, 0].set_ylabel("episode, s")
-    named = dict(zip(*reversed(panels[0, 0].get_legend_handles_labels()), strict=True))
-    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8)
-    figure.savefig(arguments.out / "scratch.png", dpi=130)
-    print(f"written to {arguments.out}/: scratch.png, the output of every training")
+    print(f"written to {arguments.out}/: the output of every training")
