@@ -1,11 +1,15 @@
 """What the single and the vector environment say of themselves alike."""
 
 import copy
+from typing import TYPE_CHECKING
 
 from gymnasium.envs.registration import EnvSpec
 
 from birthsim_env.episodes import Episodes
 from birthsim_env.physics.rig.parameters import Parameters
+
+if TYPE_CHECKING:
+    from birthsim_env.gradients import Recorder
 
 
 class Face:
@@ -26,6 +30,10 @@ class Face:
     def dt(self) -> float:
         """s of a policy step."""
         return self._episodes.setup.policy_period
+
+    def record(self) -> "Recorder":
+        """What keeps every policy step from now on, for gradients (``birthsim_env.gradients``); on a device, there."""
+        return self._episodes.record()
 
     @property
     def spec(self) -> EnvSpec | None:

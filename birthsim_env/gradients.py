@@ -1,6 +1,6 @@
 """A simulation differentiated: what an action did to reward, observation and state some policy steps later.
 
-    recorder = Recorder(env.unwrapped.simulation)    # from now on every step is kept on a tape, with the same bits
+    recorder = env.unwrapped.record()                # from now on every step is kept on a tape, with the same bits
     env.step(actions)
     back = recorder.taken()                          # the pullback of this step
     carried, by_action = back(reward=..., observation=..., carried=...)
@@ -47,7 +47,7 @@ def weigh(
 
 
 class Recorder:
-    """Runs a simulation in place of its loop, and keeps what going back needs.
+    """Runs a ``simulation`` in place of its loop, and keeps what going back needs.
 
     ``carried`` (C,) are rows of the loop's space, and of tables after it, that hand gradients from one policy step to the one
     before: state, memories, and what is measured. Raises ``ValueError`` that names what cannot be differentiated.

@@ -2,7 +2,7 @@
 
 import copy
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -19,9 +19,6 @@ from birthsim_env.physics.plant import MOST_LANES
 from birthsim_env.physics.rig.values import checked_count, shown
 from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.state import State
-
-if TYPE_CHECKING:
-    from birthsim_env.gradients import Recorder
 
 Observations = NDArray[np.float32]
 
@@ -169,10 +166,6 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
                 infos["final_obs"][lane] = last[lane]
             infos["_final_obs"] = infos["_final_info"] = ended
         return observation, rewards, terminated, truncated, infos
-
-    def record(self) -> "Recorder":
-        """What keeps every policy step from now on, for gradients (``birthsim_env.gradients``); on a device, there."""
-        return self._episodes.record()
 
     def get_state(self) -> State:
         """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.
