@@ -45,7 +45,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
 # Policies by gradients: those with a configuration of their own; environments of circle_apg.
-CONFIGURED := probe_apg circle_residual_apg
+CONFIGURED := probe_apg circle_residual_apg circle_lab_apg
 BY_GRADIENTS := circle:Circle-v1 descent:Descent-v1 forceps:Forceps-v1 dystocia:Dystocia-v1 vacuum:Vacuum-v0
 GRADIENTS := $(foreach one,$(BY_GRADIENTS),$(firstword $(subst :, ,$(one)))_apg) $(CONFIGURED)
 HONEST := circle_honest_apg
@@ -154,7 +154,7 @@ lint: $(READY)
 
 # CHANGELOG.md tells of the past.
 prose: $(NPM)/.ready
-	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md docs
+	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md CODE_OF_CONDUCT.md paper.md docs
 	python3 docs/_prose/words.py
 
 # What comes from npm: the reader of the prose, and axe-core, with which tests look at pages.

@@ -114,7 +114,7 @@ class Study:
                 drawn += self.write(options, found, whole)
             if not settings.out:
                 write_text(RESULTS / f"{name}.json", written(content))
-        print("\n\n".join(text for file, text in texts.items() if file.endswith(".md")))
+        print("\n\n".join(text.replace("**", "") for file, text in texts.items() if file.endswith(".md")))
         print(f"\nwritten to {folder}/: {', '.join([f'{name}.json', *texts, *drawn])}")
         if failures:
             raise ValueError(problem)

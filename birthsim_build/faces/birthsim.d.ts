@@ -48,4 +48,6 @@ export class Loop {
   exchange(name: string, number?: number): void;
   /** What the first stage of a part remembers. */
   memory(name: string): Float64Array;
+  /** The k-th table of a part, as an array of its kind. */
+  table<T>(name: string, k: number, Kind: new (buffer: ArrayBufferLike, from: number, size: number) => T): T;
 }

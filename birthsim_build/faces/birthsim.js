@@ -12,6 +12,7 @@ import { HEAD, INDEX, LEFT_OUT, MAGIC, ROW, ROWS } from "./layout.js";
 export { INDEX, ROW, ROWS };
 
 const PAGE = 65536;
+const PART_HEAD = 4, ENTRY = 4, DIMENSIONS = 4; // words of a part's head and of a stage in it, and of the shape of a table
 
 /** Load code and data from a folder (its URL; default: that of this module), or from bytes that are given. */
 export async function load(from = new URL("./", import.meta.url)) {
@@ -143,13 +144,28 @@ export class Loop {
 
   /** What the first stage of a part remembers. */
   memory(name) {
+    const at = this.find(name);
+    const [from, to] = [5, 6].map((k) => Number(this.words[at + k])); // its constants come behind it
+    return new Float64Array(this.words.buffer, this.words.byteOffset + 8 * (at + from), to - from);
+  }
+
+  /** The `k`-th table of a part, as an array of its kind, such as Float32Array. */
+  table(name, k, Kind) {
+    const at = this.find(name);
+    const entry = at + PART_HEAD + ENTRY * Number(this.words[at + 1]) + 2 * k;
+    const [about, from] = [0, 1].map((word) => at + Number(this.words[entry + word]));
+    const size = this.words.slice(about + 1, about + 1 + DIMENSIONS).reduce((product, length) => product * (Number(length) || 1), 1);
+    return new Kind(this.words.buffer, this.words.byteOffset + 8 * from, size);
+  }
+
+  /** @private The word at which a part begins. */
+  find(name) {
     let at = HEAD + ROWS;
     for (const [own] of this.parts) {
       if (own === name) break;
       at += Number(this.words[at]);
     }
-    const [from, to] = [5, 6].map((k) => Number(this.words[at + k])); // its constants come behind it
-    return new Float64Array(this.words.buffer, this.words.byteOffset + 8 * (at + from), to - from);
+    return at;
   }
 
   /** @private Write an image. */

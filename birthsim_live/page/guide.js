@@ -32,6 +32,12 @@ const LESSONS = [
     look: ".second figcaption",
   },
   {
+    name: "Learn it here",
+    says: "This network opens the valves, and knows nothing yet: they stay shut. Let it practise on 32 randomised rigs, whose derivatives say what to change. The rig that you see runs what it knows.",
+    settings: { scenario: "circle", controller: "learning", scenario_force: true },
+    look: ".learning",
+  },
+  {
     name: "Forceps pull",
     says: "Pulls of 175 N act on the head, as in a forceps delivery. The controller holds it with 4000 N/m; pull along and feel how far that gives way.",
     settings: { scenario: "forceps", controller: "admittance-backstepping", scenario_force: true },

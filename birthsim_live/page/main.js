@@ -10,6 +10,7 @@ import { Guide } from "./guide.js";
 import { Hand } from "./hand.js";
 import { History } from "./history.js";
 import { Keys, keyOfTheRig } from "./keys.js";
+import { Learning } from "./learning/panel.js";
 import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Means } from "./means.js";
@@ -33,10 +34,10 @@ const byId = (id) => document.getElementById(id);
  * `frame` is the newest frame of the rig, `settings` and `state` its last words on those, `hello` its greeting,
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y], k)` the
  * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures,
- * `plots` the curves.
+ * `plots` the curves, `learning` the controller that learns here.
  */
 const send = (message) => source.send(message);
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [], plots: null };
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [], plots: null, learning: null };
 window.birthsim = rig;
 
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
@@ -54,6 +55,8 @@ const change = (changes) => send({ type: "set", settings: changes });
 const settings = new Settings(byId("settings"), change);
 const guide = new Guide(change);
 const views = new Views(change, (paused) => send({ type: "pause", paused }));
+const learning = new Learning({ send, change, tell: (words) => notices.show(words) });
+rig.learning = learning;
 const challenge = new Challenge();
 const sound = new Sound(byId("sound"));
 const link = new Link();
@@ -149,6 +152,7 @@ function showSettings(values) {
   rig.settings = values;
   if (others && rig.hello.mode === "live") forget();
   rigs.show(values);
+  learning.show(rig.hello.mode === "live" ? values : {});
   if (rig.hello.mode !== "live") {
     transport.showSettings(values);
     return;
@@ -170,6 +174,7 @@ function forget() {
 function showState(values) {
   if (!values) return;
   rig.state = values;
+  learning.pause(values.paused);
   transport.show(values);
 }
 

@@ -37,7 +37,7 @@ from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
 from birthsim_live.rig.folder import Packed
 from birthsim_live.rig.greeting import OPENS, greeting
-from birthsim_live.rig.words import controller_choice
+from birthsim_live.rig.words import LEARNING, controller_choice
 
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""
@@ -46,6 +46,9 @@ PATH_POINTS = 400
 
 WITHOUT = "only with birthsim live"
 """What the page says of a controller that is not compiled."""
+
+LEARNED = f"{RESIDUAL}:circle_apg"
+"""The controller whose network the page exchanges for one that it learns (``learning.LEARNER``)."""
 
 DAMPED = (BacksteppingController, AdmittanceController, TrackingController)
 """Laws whose damping can be raised."""
@@ -77,7 +80,8 @@ def pack(
     def plant_part(rigs: Array) -> Part:
         return _part(plant_stage(rigs, np.zeros((FurtherStates.size, 1)), period))
 
-    names = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies), *others]
+    learns = [LEARNING] if policies else []
+    names = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period
     laws = {name: law for name in names if is_compiled(law := _made(name, rig))}
     parts = {name: controller_parts(law) for name, law in laws.items()}
@@ -201,7 +205,7 @@ def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
 def _made(name: str, rig: Parameters) -> Controller | None:
     """The controller ``name``; None where it cannot be made. ``ValueError`` for a policy that is none."""
     try:
-        return make_controller(name, rig)
+        return make_controller(LEARNED if name == LEARNING else name, rig)
     except (ImportError, ValueError):
         if name.startswith(RESIDUAL):
             raise

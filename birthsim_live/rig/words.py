@@ -45,6 +45,9 @@ CHOICES = {
 }
 """Setting -> choice -> what it is; controllers have theirs in ``baselines.about``."""
 
+LEARNING = "learning"
+"""The controller that learns in the page."""
+
 PAPER = {
     "words": "N. Herzig, R. Moreau, T. Redarce, F. Abry, X. Brun: Non linear position and closed loop stiffness control for a "
     "pneumatic actuated haptic interface: the BirthSIM. IROS 2015, pp. 1612-1618.",
@@ -58,6 +61,8 @@ def controller_choice(name: str) -> dict[str, str]:
     if policy != name:
         title = f"{RESIDUAL} ({' '.join(Path(policy).parts[-2:])})"
         return {"name": name, "title": title, "about": f"A law and a trained policy that corrects it: {policy}."}
+    if name == LEARNING:
+        return {"name": name, "title": "learning here", "about": "A network at the valves, which learns in this page."}
     return {
         "name": name,
         "title": Path(name).name.replace("-", " "),

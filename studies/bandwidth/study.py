@@ -21,7 +21,7 @@ from studies.haptics.multisine import FADE, sines, unit_multisine
 from studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
 from studies.results import Content
 from studies.study import Found, Options, Study
-from studies.tables import markdown
+from studies.tables import markdown, uses_force
 
 STIFFNESS = 2000.0
 """N/m."""
@@ -179,7 +179,8 @@ def _shown(content: Content) -> dict[str, str]:
     for row in content["figures"]["rows"]:
         cells = ["{} [{}, {}]; {}".format(*map(number, row[first : first + 4])) for first in (4, 8, 12)]
         rows.append([*row[:4], *cells, str(row[-1])])
-    return {"bandwidth.md": markdown(rows) + "\n"}
+    alike = [(*row[1:4], uses_force(row[0])) for row in rows[1:]]
+    return {"bandwidth.md": markdown(rows, most=rows[0][4:6], alike=alike) + "\n"}
 
 
 STUDY = Study(

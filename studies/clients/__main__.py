@@ -38,8 +38,8 @@ CLIENTS = {
     "cleanrl": Client(extras="[agents]", alone=("cleanrl==1.2.0",)),
     "torchrl": Client(extras="[agents]", needs=("torchrl==0.14.1",)),
     "skrl": Client(extras="[agents]", needs=("skrl==2.1.1",)),
-    # virtualenv, which pre-commit wants, which Tianshou wants, asks for filelock below 4.
-    "tianshou": Client(extras="[agents]", needs=("tianshou[eval]==2.0.1",), freed=("filelock",)),
+    # Tianshou's virtualenv asks for filelock below 4; rliable, which it imports, is in an extra with old packages.
+    "tianshou": Client(extras="[agents]", needs=("tianshou==2.0.1", "rliable==1.2.0"), freed=("filelock",)),
     # d3rlpy pins gymnasium 1.0.0; these are what it imports.
     "offline": Client(
         extras="[agents]",

@@ -88,7 +88,7 @@ def stiffness_figure(study: Study, folder: Path) -> list[Path]:
     for k, (name, result) in enumerate(study.items()):
         errors = _numbers(result["error_percent"])
         low, middle, high = _spread(errors)
-        within += bool(np.nanmax(np.abs(middle), initial=0.0) <= EXACT)
+        within += bool(np.abs(middle).max() <= EXACT)
         # Beside each other, or the ranges would hide one another.
         place = np.array(result["setpoints"]) * 1.022 ** (k - (len(study) - 1) / 2)
         axes.plot(place, middle, **look(k), lw=0.8, label=_label(name, errors))
@@ -189,7 +189,7 @@ def polar_figure(study: Study, folder: Path) -> list[Path]:
         axes.set_xticks(np.arange(4) * np.pi / 2, ["$x$", "$y$", "$-x$", "$-y$"])
         axes.tick_params(pad=-2)
         axes.set_title(f"{label_of(name)}\n{_range(rendered)}", loc="center")
-        round_off = float(np.nanmax(np.abs(middle / setpoint - 1), initial=0.0))
+        round_off = float(np.abs(middle / setpoint - 1).max())
         alike += 100 * round_off <= EXACT
     headline(figure, f"{alike} of {len(study)} controllers are as stiff as asked for in every direction, to {EXACT:g} %")
     legend_below(figure, said=f"rendered stiffness over the direction of the push; rings {setpoint / 2:g} N/m apart")

@@ -8,7 +8,7 @@ from typing import Any
 
 from baselines.bench.statistics import number
 from studies.comparison.grid import METRICS, MOVING, RIGS
-from studies.tables import markdown
+from studies.tables import markdown, uses_force
 
 Figures = Sequence[dict[str, Any]]
 """What ``studies.comparison.grid.statistics`` returns."""
@@ -103,7 +103,7 @@ def overview(figures: Figures) -> str:
             row.append("-" if cell is None else column.text(cell))
         own = [cell for cell in figures if cell["controller"] == name]
         rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}"])
-    return markdown(rows)
+    return markdown(rows, [column.title for column in columns], alike=[uses_force(row[0]) for row in rows[1:]])
 
 
 def losses(figures: Figures) -> str:
@@ -120,25 +120,21 @@ def losses(figures: Figures) -> str:
 
 
 def settled(figures: Figures) -> str:
-    """Settled error by controller, environment and sensors: median and 95 %, and how many of the episodes were lost; the best
-    is bold."""
+    """Settled error by controller, environment and sensors: median and 95 %, and how many of the episodes were lost."""
     kinds = list(dict.fromkeys((cell["environment"], cell["sensors"]) for cell in figures))
     several = len({environment for environment, _ in kinds}) > 1
     titles = [f"{_short(environment)}, " * several + f"{sensors} sensors" for environment, sensors in kinds]
     found = {(cell["controller"], (cell["environment"], cell["sensors"])): cell for cell in figures}
     names = controllers_of(figures)
-    best = {kind: min(names, key=lambda name: found[name, kind]["metrics"]["settled_rms"]["median"]) for kind in kinds}
     lost_of = "" if several else f", {' and '.join(sensors for _, sensors in kinds)}"
     rows = [["controller", "uses the hand's force", *titles, f"lost{lost_of}"]]
     for name in names:
         own = [found[name, kind] for kind in kinds]
         errors = [[cell["metrics"]["settled_rms"][key] for key in ("median", "q95")] for cell in own]
         cells = ["; ".join(map(number, error)) for error in errors]
-        cells = [f"**{cell}**" if best[kind] == name else cell for kind, cell in zip(kinds, cells, strict=True)]
         lost = " and ".join(str(cell["lost"]) for cell in own)
-        force = "no" if name.startswith("backstepping") or "sensorless" in name or "student" in name else "yes"
-        rows.append([f"`{name}`", force, *cells, f"{lost} of {own[0]['episodes']}"])
-    return markdown(rows)
+        rows.append([f"`{name}`", "yes" if uses_force(name) else "no", *cells, f"{lost} of {own[0]['episodes']}"])
+    return markdown(rows, titles, alike=[row[1] for row in rows[1:]])
 
 
 def _short(environment: str) -> str:
@@ -172,7 +168,7 @@ def by_sensors(figures: Figures) -> str:
                     for cell, metric in own
                 ]
                 rows.append([name, words, *three, str(sum(cell["lost"] for cell, _ in own[2:]))])
-    return markdown(rows)
+    return markdown(rows, rows[0][2:-1], alike=[(row[1], uses_force(row[0])) for row in rows[1:]])
 
 
 def data(figures: Figures) -> str:

@@ -10,6 +10,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
 from studies.haptics.kept import PEAK
 from studies.haptics.release import PULL, STIFFNESS
+from studies.tables import markdown
 
 Runs = Sequence[dict[str, Any]]
 """What ``studies.haptics.kept.kept`` gives, in the order of the rows."""
@@ -45,7 +46,7 @@ def rendering_table(runs: Runs) -> str:
         *WHO, "N/m", "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
         "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %", "lost",
     )  # fmt: skip
-    return _table(f"### Impedance under multisines of {PEAK:g} N", columns, rows)
+    return _table(f"### Impedance under multisines of {PEAK:g} N", columns, rows, columns[7:-1], columns[4:7])
 
 
 def release_table(runs: Runs) -> str:
@@ -68,7 +69,7 @@ def release_table(runs: Runs) -> str:
         *WHO, "overshoot, mm", "of the declared impedance", "peak speed, m/s", "of the declared impedance",
         "kinetic energy, J", "stored by the spring, J", "energy given, J", "lost",
     )  # fmt: skip
-    return _table(f"### A pull of {PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m", columns, rows)
+    return _table(f"### A pull of {PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m", columns, rows, LEAST)
 
 
 def backdriving_table(runs: Runs) -> str:
@@ -80,7 +81,7 @@ def backdriving_table(runs: Runs) -> str:
         if found:
             rows.append([*_who(run), *(_beyond(found[stiffness]) for stiffness in stiffnesses)])
     columns = (*WHO, *(f"at {value:g} N/m" for value in stiffnesses))
-    return _table("### Force beyond K x at 10 mm/s, N (median of the means; largest)", columns, rows)
+    return _table("### Force beyond K x at 10 mm/s, N (median of the means; largest)", columns, rows, columns[3:])
 
 
 def stability_table(runs: Runs) -> str:
@@ -106,11 +107,15 @@ def stability_table(runs: Runs) -> str:
     if any("z_width" in run for run in runs):
         columns += ["stable up to, N/m", "with the best damping, N/m"]
     title = f"### Held by hands of 0 to 20 kN/m and 0 to 2 kg at {SETPOINT:g} N/m, and Z-width against {len(HANDS)} of them"
-    return _table(title, columns, rows)
+    best = [name for name in columns if "stable" in name or "damping" in name]
+    return _table(title, columns, rows, ("motion, mm", "force, N", "energy given, J"), best)
 
 
 UNDER_MULTISINES = ("noticed", "error_own_mm", "error_spring_mm", "energy", "shortage", "air", "saturation")
 """Figures of a lane that the table of impedances has with their worst."""
+
+LEAST = ("overshoot, mm", "peak speed, m/s", "kinetic energy, J", "energy given, J")
+"""Of a release."""
 
 WHO = ("controller", "sensors", "uses the hand's force")
 
@@ -152,8 +157,9 @@ def _z_width(piece: dict[str, Any]) -> tuple[str, str]:
     return own, best
 
 
-def _table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    if not rows:
-        return ""
-    head = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return "\n".join([title, "", *head, *("| " + " | ".join(row) + " |" for row in rows)])
+def _table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], least: Sequence[str], most: Sequence[str] = ()
+) -> str:
+    """Of the same sensors and told the same; impedances of the same setpoint, which is the fourth column there."""
+    told = 4 if "N/m" in columns else 3
+    return f"{title}\n\n{markdown([columns, *rows], least, most, [row[1:told] for row in map(tuple, rows)])}" if rows else ""

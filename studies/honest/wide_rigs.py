@@ -116,7 +116,7 @@ def _shown(content: Content) -> dict[str, str]:
         beyond = [f"{shown[key]}; {own[key]['beyond']} of {own[key]['of']}" for key in METRICS]
         believes = f"its rig to {100 * OFF:g} %" if own["known"] else "the default rig"
         rows.append([f"`{own['controller']}`", believes, *beyond, shown["stiffness_error"]])
-    return {"wide_rigs.md": markdown(rows) + "\n"}
+    return {"wide_rigs.md": markdown(rows, rows[0][2:], alike=[row[1] for row in rows[1:]]) + "\n"}
 
 
 STUDY = Study(

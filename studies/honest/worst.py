@@ -24,7 +24,7 @@ from studies.comparison.grid import as_described
 from studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
 from studies.results import Content
 from studies.study import Options, Study
-from studies.tables import markdown
+from studies.tables import markdown, uses_force
 
 ENVIRONMENT = environment_id("probe")
 PUSHED = SCENARIOS["probe"].duration - PROBE_REST
@@ -135,7 +135,9 @@ def _shown(content: Content) -> dict[str, str]:
         f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst. The last column has "
         f"what {settings['episodes']} further episodes found by moving the rigs of the worst worlds within their ranges."
     )
-    return {"worst.md": "\n\n".join([text, *map(markdown, (rows, worlds, changed))]) + "\n"}
+    alike = [(row[1], uses_force(row[0])) for row in rows[1:]]
+    tables = [markdown(rows, rows[0][2:6], alike=alike), markdown(worlds), markdown(changed)]
+    return {"worst.md": "\n\n".join([text, *tables]) + "\n"}
 
 
 def _number(value: float | str) -> str:

@@ -18,7 +18,7 @@ from birthsim_env.physics.rig.parameters import load_parameters
 from studies.learned import felt
 from studies.results import Content
 from studies.study import Found, Options, Study
-from studies.tables import cells, markdown
+from studies.tables import cells, markdown, uses_force
 
 
 class Run(NamedTuple):
@@ -53,6 +53,7 @@ RUNS = {
         )
     },
     "circle_residual_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000),
+    "circle_lab_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000, ("admittance-backstepping", "admittance-adaptive"), "lab"),
 }  # fmt: skip
 """Policy -> its run; seeds were never used for training or design."""
 
@@ -141,6 +142,7 @@ def _beside(figures: dict[str, Any]) -> str:
     """Policies beside classical controllers."""
     settled, *others = [name for name, _ in COMPARED.values()]
     rows = [["world, sensors", "controller", settled, *felt.COLUMNS.values(), *others, "lost"]]
+    alike = []
     for policy, found in figures.items():
         every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
         for controller in dict.fromkeys(row[2] for row in every):
@@ -150,7 +152,8 @@ def _beside(figures: dict[str, Any]) -> str:
             name = controller.replace("residual", policy) if controller.startswith("residual") else controller
             of, _, lost, *_ = own["lost episodes"]
             rows.append([world, name, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
-    return markdown(rows) + "\n"
+            alike.append((policy, uses_force(name)))
+    return markdown(rows, rows[0][2:-1], alike=alike) + "\n"
 
 
 def _by_gradients(content: Content) -> dict[str, str]:

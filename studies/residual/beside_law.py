@@ -216,7 +216,7 @@ def _shown(content: Content) -> dict[str, str]:
         f"{figures['within']} of {settings['episodes']} episodes, seeds from {settings['seed']}, `{settings['sensors']}` "
         "sensors, randomised rigs, are within the rig's strength. Differences compare the same worlds, with 95 % intervals. "
         f"The static stiffness is that of a held push in as many worlds of `{PUSHED}`.",
-        markdown(rows),
+        markdown(rows, [head[1], "95 %", rows[0][5], *STATIC]),
     ]
     if figures["felt"]:
         rows = [["controller", *FELT.values(), *MORE.values(), "lost"]]

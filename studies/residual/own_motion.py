@@ -100,7 +100,12 @@ def _shown(content: Content) -> dict[str, str]:
         f"{settings['episodes']} circles from seed {settings['seed']}, `{settings['sensors']}` sensors, randomised rigs, those "
         f"within the rig's strength. Differences compare the same worlds, with 95 % intervals. Below: `{STATIC}`."
     )
-    return {"own-motion.md": "\n\n".join([head, markdown(rows), markdown(static)]) + "\n"}
+    return {
+        "own-motion.md": "\n\n".join(
+            [head, markdown(rows, rows[0][2:3], alike=[row[0] for row in rows[1:]]), markdown(static, static[0])]
+        )
+        + "\n"
+    }
 
 
 STUDY = Study(

@@ -196,7 +196,7 @@ def test_pictures_show_medians_and_ranges_and_name_what_is_lost(drawn, tmp_path)
     assert second.get_title() == "bad\nall lost"
     np.testing.assert_allclose(first.lines[0].get_ydata(), [2000, 2000, 1500, 2000])
     first, second = drawn["stiffness_ellipses"].axes[:2]
-    assert first.get_title() == f"good\noff by {100 * 200 / math.hypot(2000, 2000):.3g} %, worst 7.07 %"
+    assert first.get_title() == f"good\noff by {100 * 200 / math.hypot(2000, 2000):.3g} %; 7.07 %"
     assert second.get_title() == "bad\nall lost"
     rendered = first.lines[0]
     assert (rendered.get_xdata().max() - 400) / (rendered.get_ydata().max()) == pytest.approx(1.1, rel=1e-3)

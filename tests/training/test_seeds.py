@@ -155,7 +155,7 @@ def test_evaluation_says_of_a_policy_that_was_trained_with_other_sensors(tmp_pat
 
 def test_scores_are_of_policies_that_were_trained_with_their_sensors():
     names = {policy.partition("/")[0] for _, policy in _contestants("BirthSIM/Circle-v1") if policy}
-    assert names == {"circle", "circle_lab", "circle_pure", "circle_apg", "circle_residual_apg"}
+    assert names == {"circle", "circle_lab", "circle_pure", "circle_apg", "circle_residual_apg", "circle_lab_apg"}
 
 
 @pytest.mark.slow

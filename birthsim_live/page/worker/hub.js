@@ -5,7 +5,7 @@ import { Device } from "./device.js";
 import { frameOf } from "./frames.js";
 import { Recorder } from "./recorder.js";
 import { Session } from "./session.js";
-import { checked } from "./settings.js";
+import { LEARNING, checked } from "./settings.js";
 
 export class Hub {
   /** `post` sends a message to the page. */
@@ -28,7 +28,7 @@ export class Hub {
   async receive(message) {
     try {
       const act = this[`on_${message.type}`];
-      if (!act) throw new Error(`${message.type} in a live session; allowed: drag, push, release, device, set, pause, speed, reset, record`);
+      if (!act) throw new Error(`${message.type} in a live session; allowed: drag, push, release, device, learned, set, pause, speed, reset, record`);
       await act.call(this, message);
       this.clock.touch();
     } catch (error) {
@@ -56,6 +56,12 @@ export class Hub {
       this.device = null;
       if (reason) this.post({ type: "error", message: reason });
     });
+  }
+
+  /** The controller that learns knows more; a rig that it lost begins anew. */
+  on_learned({ network }) {
+    this.session.teach(network);
+    if (this.session.halted && [this.session, this.session.second].some((one) => one?.settings.controller === LEARNING)) this.on_reset();
   }
 
   on_pause({ paused }) {

@@ -1,8 +1,9 @@
 // A rig that a person plays with, and one beside it to compare: control periods, no clock.
 
 import { INDEX, Loop, ROW } from "../rig/birthsim.js";
+import { putNetwork } from "./learned.js";
 import { Remote } from "./remote.js";
-import { NOTHING, STIFFNESSES, merged } from "./settings.js";
+import { LEARNING, NOTHING, STIFFNESSES, merged } from "./settings.js";
 
 // Parts that run together.
 const LAW = ["policy", "law"];
@@ -30,6 +31,7 @@ export class Session {
     this.recorder = null;
     this.second = null; // the rig beside it: the same world, settings and hand under the controller `settings.compare`
     this.remote = null; // the controller, where it runs in Python
+    this.network = null; // what the controller LEARNING has learned
     this.hands = new Hands();
     this.loop = new Loop(bundle, bundle.rows(INDEX.zero), pack.parts.rig);
     this.put(["valves"], pack.parts.valves[settings.valves]);
@@ -77,8 +79,16 @@ export class Session {
     this.remote?.close();
     this.remote = python.includes(controller) ? new Remote(controller) : null;
     this.put(LAW, this.remote ? {} : parts.controllers[controller][this.sampled ? "sampled" : "exact"]);
+    if (controller === LEARNING) putNetwork(this.loop, this.network);
     this.damped = Boolean(damped[controller]);
     this.loop.set("damping_factor", 0);
+  }
+
+  /** What the controller LEARNING has learned by now: `network` as of learned.js. */
+  teach(network) {
+    this.network = network;
+    if (this.settings.controller === LEARNING) putNetwork(this.loop, network);
+    this.second?.teach(network);
   }
 
   putSensors() {
@@ -181,6 +191,7 @@ export class Session {
     else {
       this.second?.remote?.close();
       this.second = now.compare === NOTHING ? null : new Session(this.pack, this.bundle, { ...now, controller: now.compare, compare: NOTHING });
+      this.second?.teach(this.network);
     }
     if (this.second && (now.controller !== before.controller || now.compare !== before.compare)) this.reset();
   }

@@ -1,5 +1,6 @@
 // What a person can set, and what is refused.
 
+export const LEARNING = "learning"; // the controller that learns in the page
 export const NOTHING = "nothing"; // to compare with
 export const STIFFNESSES = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"]; // instead of the scenario's setpoints, in the order of a reference
 

@@ -1,4 +1,4 @@
-"""What the page teaches: it opens with a problem that can be seen, leads through six lessons, and is a link."""
+"""What the page teaches: it opens with a problem that can be seen, leads through seven lessons, and is a link."""
 
 import json
 
@@ -34,6 +34,7 @@ def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window
         "Halve the stiffness": {"controller": "backstepping", "Kclx": 1000, "Kcly": 1000, "stiffness_source": "sliders"},
         "What the force sensor buys": {"controller": "admittance-backstepping", "compare": "backstepping"},
         "What learning adds": {"controller": "residual:circle", "compare": "backstepping", "scenario": "circle", "mass": 4},
+        "Learn it here": {"controller": "learning", "scenario": "circle", "scenario_force": True, "compare": "nothing"},
         "Forceps pull": {"scenario": "forceps", "scenario_force": True, "friction": 1, "compare": "nothing"},
     }
     window.page.locator("#guide").select_option("Feel the friction")

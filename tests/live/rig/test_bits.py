@@ -11,6 +11,7 @@ from birthsim_env.loop.rows import SINCE_JUMP
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_live.rig.folder import packed_page, write_page
+from birthsim_live.rig.words import LEARNING
 from studies.targets.reference import SHARED, loop_rows
 from tests.build.targets import assert_same_bits
 from tests.live.rig.worker import run
@@ -22,7 +23,7 @@ PULL, FAR, PUSH, HARD = {"position": [0.56, 0.02]}, {"position": [0.7, -0.2]}, {
 OFFERED = [
     one["name"]
     for one in packed_page(Parameters()).content["hello"]["choices"]["controller"]
-    if "missing" not in one and not one["name"].startswith("limited")
+    if "missing" not in one and not one["name"].startswith(("limited", LEARNING))
 ]
 DEFAULT, WORN = Parameters(), Parameters().replace({"valves.deadband": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7})
 SOFT = Parameters().replace({"chambers.tube_length": 1.0, "air.supply_conductance": 2e-8, "mechanics.mode_frequency": 30.0})

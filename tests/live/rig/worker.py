@@ -34,6 +34,7 @@ for (const steps of JSON.parse(readFileSync(0))) {
     if (kind === "set") session.change(value);
     else if (kind === "reset") session.reset();
     else if (kind === "hold") session.hands.hold = value && { ...value, id: 7 };
+    else if (kind === "teach") session.teach(value);
     else if (kind === "put") (value[2] ? session.second : session).loop.set(value[0], value[1] ?? NaN);
     let done = 0;
     if (kind === "advance") {
@@ -81,8 +82,8 @@ def node(folder: Path, script: str, given: Any = None) -> Any:
 
 
 def run(folder: Path, *cases: list[tuple[str, Any]]) -> list[list[Told]]:
-    """What a rig says after each step of each case, ("set" | "reset" | "hold" | "put" | "advance", value); ``folder`` holds the
-    page."""
+    """What a rig says after each step of each case, ("set" | "reset" | "hold" | "put" | "teach" | "advance", value);
+    ``folder`` holds the page."""
 
     def told(said: dict[str, Any]) -> Told:
         widths, texts = (ROWS, ROWS, COLUMNS, COLUMNS), said.pop("rows")
