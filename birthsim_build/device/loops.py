@@ -1,8 +1,10 @@
 """The loops of environments as ``Pieces``."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from baselines.staged import driving
+from baselines.staged import Driving, driving
 from birthsim_build.device.program import Pieces
 from birthsim_build.loops import compiled_law
 from birthsim_env.assembly import assemble
@@ -12,15 +14,22 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Simulation
 
 
-def pieces_of(simulation: Simulation) -> Pieces:
-    """The loop of lanes that have begun; ``ValueError`` names the argument that is a user's Python, which no device runs."""
+def pieces_of(simulation: Simulation, commanded: Sequence[Stage] = (), moved: Sequence[Stage] = ()) -> Pieces:
+    """The loop of lanes that have begun; ``ValueError`` names the argument that is a user's Python, which no device runs.
+
+    Stages that look on, once the valves are ``commanded`` or the rig has ``moved``, stand where ``Simulation.watch`` puts them.
+    """
+    parts = simulation.parts()
+    parts = {**parts, "actuation": [*parts["actuation"], *commanded], "sensors": [*moved, *parts["sensors"]]}
     arguments = {
         "actuation": simulation.actuation, "board": simulation.sensors, "target": simulation.trajectory,
         "setpoints": simulation.stiffness, "hand": simulation.user_force, "sensors": simulation.sensors,
     }  # fmt: skip
     names = {"target": "reference", "setpoints": "stiffness", "hand": "user_force", "board": "sensors"}
+    if isinstance(simulation.actuation, Driving):
+        arguments["actuation"], names["actuation"] = simulation.actuation.controller, "controller"
     stages = []
-    for part, group in simulation.parts().items():
+    for part, group in parts.items():
         for one in group:
             if not isinstance(one, Stage):
                 owner = type(arguments[part]).__name__

@@ -17,8 +17,6 @@ const REACH = 0.075; // m that a hand moves the head, unless the spring is soft
 const SOFT = 1400; // N/m
 const NARROW = 760; // px; narrower pictures have this room, m, for the arrow of a pull
 const ROOM = 0.06;
-const PHONE = 500; // px; narrower ones go without the far end of cylinder 2, m
-const CUT = 0.13;
 const LEAST_ARROW = 24; // px
 
 export class Scene {
@@ -68,7 +66,6 @@ export class Scene {
     const reach = REACH + this.geometry.head.radius;
     const [xs, ys] = [0, 1].map((k) => this.path.map((point) => point[k]));
     const { width } = this.sheet;
-    if (width < PHONE) low[0] += CUT;
     if (width < NARROW) {
       high[0] += ROOM;
       xs.push(Math.max(...xs) + ROOM);

@@ -1,5 +1,6 @@
 // What of the page is in sight: the story alone, with its lab, or, embedded in another page, the rig and its switch alone.
 
+import { foldable } from "./fold.js";
 import { EMBED } from "./link.js";
 
 const LAB = "#lab";
@@ -18,6 +19,7 @@ export class Views {
       search.delete(EMBED);
       whole.href = `${location.pathname}?${search}`;
     });
+    foldable(document.getElementById("fold"), document.getElementById("handle"));
     addEventListener("hashchange", () => this.open(location.hash === LAB));
     this.open(location.hash === LAB);
   }

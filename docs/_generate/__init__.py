@@ -14,6 +14,7 @@ from _generate.page import page
 from _generate.pictures import pictures
 from _generate.rig import rig
 from _generate.root_pages import PAGES, root_page
+from _generate.stages import stage
 
 PARTS = {
     "api_birthsim_env.md": partial(api, "birthsim_env"),
@@ -32,6 +33,8 @@ PARTS = {
 def write(folder: Path) -> None:
     """Write every part, and the moving pictures of the environments, into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
+    stage("reference pages from code")
     for name, part in PARTS.items():
         (folder / name).write_text(part(), encoding="utf-8")
+    stage("moving pictures of the environments")
     pictures(folder)

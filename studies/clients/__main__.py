@@ -46,7 +46,7 @@ CLIENTS = {
         needs=("minari[hdf5,create]==0.5.4", "click", "colorama", "dataclasses-json", "gym", "scikit-learn", "structlog"),
         alone=("d3rlpy==2.8.1",),
     ),
-    "cluster": Client(extras="[cluster]"),
+    "cluster": Client(extras="[cluster,build]"),
     # Never ray[rllib]: it pins gymnasium 1.2.2. These are what RLlib imports.
     "rllib": Client(
         extras="[agents]",

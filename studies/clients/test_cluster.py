@@ -1,16 +1,21 @@
-"""Pieces on a Ray cluster of loopback: the same bytes as with joblib, failures by name, a worker that dies, an evaluation."""
+"""Pieces on a Ray cluster of loopback: the same bytes as with joblib, failures by name, a worker that dies, evaluations."""
 
 import json
 import os
 import socket
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from baselines.bench.evaluation import merged
+from baselines.registry import make_controller
 from baselines.work.side_by_side import side_by_side
 from baselines.work.tasks import Task, run_tasks
+from birthsim_build.device.evaluation import evaluate_on
+from birthsim_env import Parameters
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +56,14 @@ def test_an_evaluation_has_the_same_bytes(cluster, tmp_path):
         subprocess.run(command, check=True, capture_output=True)
     for name in ("evaluation.csv", "evaluation.json", "evaluation.md"):
         assert (tmp_path / "ray" / name).read_bytes() == (tmp_path / "joblib" / name).read_bytes()
+
+
+def test_two_devices_in_two_workers_are_one(cluster):
+    law = make_controller("admittance-backstepping", Parameters())
+    world = {"sensors": "lab", "randomize": True, "duration": 0.3}
+    run, parts = partial(evaluate_on, "host", "BirthSIM/Circle-v1", law, "law", **world), {}
+    side_by_side(run, [(3, 0), (4, 3)], 2, parts.__setitem__, cluster)
+    assert json.dumps(merged([parts[0], parts[1]], "law").to_dict()) == json.dumps(run(7, 0).to_dict())
 
 
 def test_what_a_piece_raises_is_raised_here(cluster):

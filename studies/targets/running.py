@@ -1,19 +1,24 @@
-"""Runs built loops: WebAssembly in Node, the shared library in this process, objects for other processors under qemu."""
+"""Runs built loops: WebAssembly in Node, a library and threads in this process, objects for other processors under qemu."""
 
 import ctypes
 import json
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from birthsim_build.bundle import identifier
+from birthsim_build.code.threads import Threads
+from birthsim_build.device.export import write_programs
+from birthsim_build.device.machine import WIDTH, Host
 from birthsim_build.image import HEAD
 from birthsim_build.layout import LAYOUT, ROWS
 from birthsim_env.loop.rows import ASKED, WORLD
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 HERE = Path(__file__).resolve().parent
 ROW = {row.name: row.number for row in LAYOUT}
@@ -73,3 +78,24 @@ def emulated_rows(target: str, folder: Path, name: str, periods: int, seen: Arra
     content = b"" if seen is None else np.ascontiguousarray(seen).tobytes()
     done = subprocess.run([program, str(folder / "trace")], input=content, check=True, capture_output=True)
     return np.frombuffer(done.stdout).reshape(periods, ROWS)
+
+
+def thread_rows(loops: Sequence[tuple[str, str, str]], rig: Parameters, folder: Path, periods: int) -> Iterator[Array]:
+    """Per loop (scenario, sensors, controller) all rows that a lane has after each control period, (periods, ROWS), else NaN.
+
+    They are those of the first lane of a second block of a graphics processor's threads, whose code this processor runs.
+    """
+    functions, space, _ = write_programs(loops, rig, 0, folder)
+    run, lanes = Host().load(tuple(functions), Threads(space)), WIDTH + 1
+    for scenario, sensors, controller in loops:
+        name = f"{scenario}_{sensors}_{identifier(controller)}"
+        words, about = np.fromfile(folder / f"{name}.bin", dtype=np.int64), json.loads((folder / f"{name}.json").read_text())
+        data, kept = np.zeros((about["words_of_data"], lanes)), np.full((periods, ROWS), np.nan)
+        own = [(ROW[row], at) for row, at in about["rows"].items() if row in ROW]
+        numbers, places = map(list, zip(*own, strict=True))
+        run("place", 1, words.ctypes.data, data.ctypes.data, lanes)
+        run("fill", lanes, words.ctypes.data, 0, 0)
+        for row in kept:
+            run("advance", lanes, words.ctypes.data, 1, 0)
+            row[numbers] = data[places, WIDTH]
+        yield kept

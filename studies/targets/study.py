@@ -10,7 +10,7 @@ from typing import Any
 
 from baselines.registry import LISTED
 from baselines.work.tasks import Result, Task
-from birthsim_build.building import build_c, build_cortex, build_wasm
+from birthsim_build.building import build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.targets import HOST
@@ -33,13 +33,13 @@ from studies.targets.reference import (
     loop_rows,
     plant_states,
 )
-from studies.targets.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
+from studies.targets.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows, thread_rows
 
 LAWS, POLICY = ("backstepping", "admittance-backstepping"), "circle"
 LOOPS = (("ideal", "backstepping"), ("lab", "admittance-backstepping"), ("ideal", f"residual:{POLICY}"))
 """Closed loops on the Circle of which every target gives bits and speed."""
 
-TARGETS = ("wasm", "x86-64", "aarch64", "cortex-m7", "every")
+TARGETS = ("wasm", "x86-64", "aarch64", "cortex-m7", "ptx", "every")
 """What is built; ``every``: WebAssembly with all scenarios, sensors and compiled controllers."""
 
 STATE, OPENINGS = slice(ROW["y1"], ROW["y1"] + 18), [ROW[f"opening_{name}"] for name in CHAMBERS]
@@ -91,8 +91,10 @@ def _cases(target: str, bundle: Bundle) -> list[Case]:
 def built(target: str) -> Result:
     """What the build says of sizes, and per case its bits ("equal" or from where they differ) and its speed, periods/s."""
     require_llvm()
-    require_linker()
     rig = Parameters()
+    if target == "ptx":
+        return _threads(rig)
+    require_linker()
     if target == "every":
         bundle = make_bundle(rig, SCENARIOS, SENSORS, LISTED, [POLICY])
     elif target == "cortex-m7":
@@ -112,6 +114,24 @@ def built(target: str) -> Result:
         return {"report": report, "lines": [_line(target, folder, case) for case in _cases(target, bundle)]}
 
 
+def _threads(rig: Parameters) -> Result:
+    """What a graphics processor gets, with the bits of what its threads run, run here."""
+    loops = [("circle", *loop) for loop in LOOPS]
+    with tempfile.TemporaryDirectory() as place:
+        folder, lines = Path(place), list[Any]()
+        build_threads(loops, rig, 0, None, folder)
+        sizes = {path.name: path.stat().st_size for path in sorted(folder.iterdir()) if path.suffix in (".ptx", ".bin")}
+        for rows, case in zip(thread_rows(loops, rig, folder, PERIODS), (_loop(*loop) for loop in loops), strict=True):
+            period = first_difference(rows[:, case.rows], case.python()[1])
+            lines.append([case.label, _verdict(period), None])
+    return {"report": {"bytes": sizes}, "lines": lines}
+
+
+def _verdict(period: int | None) -> str:
+    """The bits, in words."""
+    return "equal" if period is None else f"differ from period {period} on"
+
+
 def _line(target: str, folder: Path, case: Case) -> list[Any]:
     given, wanted = case.python()
     inputs, speed = as_inputs(given) if case.rows is OPENINGS else given, None
@@ -122,7 +142,7 @@ def _line(target: str, folder: Path, case: Case) -> list[Any]:
     else:
         rows, speed = node_rows(folder, case.node, folder, PERIODS, inputs)
     period = first_difference(rows[:, case.rows], wanted)
-    return [case.label, "equal" if period is None else f"differ from period {period} on", speed]
+    return [case.label, _verdict(period), speed]
 
 
 def _library_speed(folder: Path, name: str) -> float:
@@ -145,8 +165,9 @@ def _shown(content: Content) -> dict[str, str]:
     for target, found in figures.items():
         laws = found["report"].get("estimate") or {}
         rows = [["what", "bits", "estimate per period" if laws else "speed"]]
+        untimed = "a thread's code, run here" if target == "ptx" else "emulated"
         rows += [
-            [label, bits, _cycles(laws, label) if laws else "emulated" if speed is None else f"{speed:,.0f}/s"]
+            [label, bits, _cycles(laws, label) if laws else untimed if speed is None else f"{speed:,.0f}/s"]
             for label, bits, speed in found["lines"]
         ]  # fmt: skip
         parts += [f"### {target}", markdown(rows), *([_firmware(found["report"])] if laws else [])]

@@ -1,16 +1,22 @@
 """Environments on a device: the code of a GPU's thread run by this processor gives the bits of the native environment."""
 
+import copy
 import json
 import sys
 import types
+from functools import partial
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 
+from baselines.bench.evaluation import evaluate
+from baselines.controller import PlainLaw
+from baselines.registry import make_controller
 from birthsim_build.device import episodes, machine
-from birthsim_env import ForceProfile, StiffnessSchedule
+from birthsim_build.device.evaluation import evaluate_on
+from birthsim_env import ForceProfile, Parameters, StiffnessSchedule
 from birthsim_env.parts.references import Trajectory
 from tests.build.targets import imported, need_threads
 from tests.oracles.golden import fingerprints
@@ -155,14 +161,53 @@ def test_a_law_without_gains_is_explained_in_the_same_words():
     assert said[0] == said[1]
 
 
+class Blow(ForceProfile):
+    """A hand that throws some lanes out of their range."""
+
+    def knots(self, rng):
+        return [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.101, *rng.uniform(-600, 600, 2))]
+
+
+def law(name="admittance-backstepping"):
+    return make_controller(name, Parameters())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lanes", "world"), [(33, {}), (300, {"user_force": Blow()})])
+def test_an_evaluation_measures_the_same(lanes, world):
+    shared = {"sensors": "lab", "randomize": True, "duration": 0.6, **world}
+    here = evaluate(CIRCLE, law(), "law", lanes, SEED, False, **copy.deepcopy(shared))
+    there = evaluate_on("host", CIRCLE, law(), "law", lanes, SEED, **copy.deepcopy(shared))
+    # JSON writes every bit of a number, and NaN as NaN.
+    assert json.dumps(here.to_dict()) == json.dumps(there.to_dict())
+    assert_equal(np.concatenate(here.traces, axis=1), np.concatenate(there.traces, axis=1))
+    assert bool(world) == (0 < sum(here.lost) < lanes)
+
+
+@pytest.mark.slow
+def test_an_evaluation_refuses_in_the_same_words():
+    said = []
+    for run in (evaluate, partial(evaluate_on, "host")):
+        with pytest.raises(ValueError, match="10") as refused:
+            run(CIRCLE, law("backstepping"), "law", 2, SEED, stiffness=StiffnessSchedule(closed_loop=(10.0,)))
+        said.append(str(refused.value))
+    assert said[0] == said[1]
+
+
 class Still(Trajectory):
     def sample(self, time):
         return np.repeat([[0.5], *[[0.0]] * 7], len(time), axis=1)
 
 
+class Asleep(PlainLaw):
+    """A user's controller."""
+
+
 def test_what_no_device_does_is_refused_by_name(monkeypatch):
     with pytest.raises(ValueError, match=r"reference = Still, in Python; allowed on a device: what is compiled"):
         made("host", reference=Still())
+    with pytest.raises(ValueError, match=r"controller = Asleep, in Python; allowed on a device: what is compiled"):
+        evaluate_on("host", CIRCLE, Asleep(lambda measurement, reference: 0.0), "asleep", 2, SEED)
     with pytest.raises(ValueError, match=r"device = 'gpu'; allowed: None, 'host', 'cuda'"):
         made("gpu")
     with pytest.raises(ValueError, match=r"render_mode, with a device, = 'rgb_array'; allowed: None"):

@@ -26,6 +26,8 @@ from tests.build.targets import need_threads
 
 SEED = 2_000_000
 WAY = "birthsim_env.parts.references:_path_stage"
+LOOKS = {"baselines.bench.measures:_see", "baselines.bench.measures:_pay"}
+"""What measures an evaluation."""
 
 
 def begun(lanes, scenario="circle", controller=None, **arguments):
@@ -160,14 +162,14 @@ def test_a_hundred_thousand_threads():
 
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory):
-    """PTX of all scenarios, sensors, compiled controllers and a policy."""
+    """PTX of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
     folder = tmp_path_factory.mktemp("ptx")
     made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
     made += [
         begun(2, sensors=sensors, controller=name) for name in (*LISTED, "residual:circle") for sensors in ("ideal", "lab")
     ]
     functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
-    compile_object(sorted(functions), "ptx", folder / "all.o", threads=threads.Threads(1024))
+    compile_object(sorted(functions | LOOKS), "ptx", folder / "all.o", threads=threads.Threads(1024))
     return folder / "all.ptx"
 
 

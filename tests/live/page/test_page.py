@@ -76,7 +76,7 @@ def test_keys_push(window):
     window.wait("birthsim.frame.pointer === null")
 
 
-def test_a_finger_drags_the_head_and_scrolls_beside_it(chromium, server):
+def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, server):
     with Window(chromium, server.url, NARROW, touch=True) as window:
         session = window.context.new_cdp_session(window.page)
 
@@ -92,11 +92,29 @@ def test_a_finger_drags_the_head_and_scrolls_beside_it(chromium, server):
         assert window.value("scrollY") == 0
         touch("touchEnd")
         window.wait("birthsim.frame.pointer === null")
-        touch("touchStart", (x, y + 150))
+        sheet = "document.querySelector('#fold')"
+        place = window.value("document.querySelector('#rig').getBoundingClientRect().top")
+        touch("touchStart", (x, 760))
         for k in range(1, 9):
-            touch("touchMove", (x, y + 150 - 15 * k))
-        window.wait("scrollY > 20")
+            touch("touchMove", (x, 760 - 15 * k))
+        window.wait(f"{sheet}.scrollTop > 20")
         touch("touchEnd")
+        assert window.value("document.querySelector('#rig').getBoundingClientRect().top") == place, "the rig stays"
+        # The handle makes the sheet higher, by finger and by keys; a tap folds it away.
+        handle = window.page.locator("#handle")
+        box = handle.bounding_box()
+        middle, top = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        touch("touchStart", (middle, top))
+        for k in range(1, 6):
+            touch("touchMove", (middle, top - 20 * k))
+        touch("touchEnd")
+        window.wait(f"Math.abs({sheet}.clientHeight - {0.42 * NARROW['height'] + 100}) < 3")
+        handle.press("ArrowDown")
+        window.wait(f"Math.abs({sheet}.clientHeight - {0.42 * NARROW['height'] + 40}) < 3")
+        assert window.value("birthsim.frame.pointer") is None, "no key pushes the head"
+        handle.tap()
+        window.wait(f"{sheet}.clientHeight === 40")
+        assert window.value("document.documentElement.scrollHeight") == NARROW["height"]
         assert window.complaints == []
 
 

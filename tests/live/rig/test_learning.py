@@ -45,6 +45,23 @@ learner.settle();
 const errors = Array.from({ length: given.updates }, () => learner.update());
 console.log(JSON.stringify(errors));
 """
+LOST = """
+import { readFileSync } from "node:fs";
+import { load } from "./rig/birthsim.js";
+import { Hub } from "./worker/hub.js";
+
+const pack = JSON.parse(readFileSync("rig/pack.json"));
+const bundle = await load({ code: readFileSync("rig/loop.wasm"), data: readFileSync("rig/loop.bin") });
+const found = ["learning", "pid"].map((controller) => {
+  const hub = new Hub(pack, bundle, () => {});
+  hub.session.change({ controller });
+  hub.session.lost = "too hot";
+  const before = hub.session.lost;
+  hub.on_learned({ network: null });
+  return [before, hub.session.lost];
+});
+console.log(JSON.stringify(found));
+"""
 ADAM = """
 const network = new Network([2, 1]);
 const adam = new Adam(network, about.moments);
@@ -135,3 +152,9 @@ def test_the_rig_runs_what_was_learned(tmp_path: Path) -> None:
     assert np.array_equal(own[-1].row, learned[-1].row, equal_nan=True)
     assert not none[-1].of("openings").any()
     assert own[-1].of("openings").any()
+
+
+def test_a_rig_that_it_lost_begins_anew_when_more_is_known(tmp_path: Path) -> None:
+    write_page(tmp_path / "page", packed_page(Parameters()))
+    found = node(tmp_path / "page", LOST)
+    assert found == [["too hot", None], ["too hot", "too hot"]]  # under another controller nobody helps
