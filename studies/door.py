@@ -34,7 +34,7 @@ STUDIES = {
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
     "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
     "installed": Entry("installed", "STUDY", "README's commands, from the wheel alone in an empty home"),
-    "leaderboard": Entry("leaderboard", "", "whether entries of leaderboard/ repeat in every bit; writes its table"),
+    "leaderboard": Entry("leaderboard", "", "whether entries of leaderboard/ repeat, bit for bit"),
     "learned": Entry("learned.study", "STUDY", "what shipped policies take off controllers' errors"),
     "limited": Entry("comparison.study", "LIMITED", "what a limiter costs"),
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
