@@ -21,7 +21,7 @@ MASS = "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 and"
 RAY = "allowed: ray, or ray:ADDRESS of a running cluster"
 
 TABLE = {
-    "export --to riscv": "--to 'riscv'; allowed: onnx, wasm, c, x86-64, aarch64, cortex-m7",
+    "export --to riscv": "--to 'riscv'; allowed: onnx, hub, minari, wasm, c, x86-64, aarch64, cortex-m7",
     "export --to wasm --env CartPole-v1 --out x": "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1",
     "export --to wasm --controller shut-valves --out x": f"controller = 'shut-valves'; {COMPILED}",
     "export --to wasm --controller nothing --out x": "controller = 'nothing'; allowed: backstepping",
@@ -109,8 +109,8 @@ TABLE = {
     "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
     "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to fmux": "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help",
-    "export --to stone": "--to 'stone'; allowed: onnx, wasm, ",
-    "export": "--to is missing; allowed: onnx, wasm, ",
+    "export --to stone": "--to 'stone'; allowed: onnx, hub, minari, wasm, ",
+    "export": "--to is missing; allowed: onnx, hub, minari, wasm, ",
     **{
         f"live --request-time {time}": f"{time!r}; allowed: a finite number > 0 and <= 3600"
         for time in ("0", "-1", "nan", "1e9", "soon")

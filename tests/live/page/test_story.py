@@ -90,6 +90,7 @@ def test_one_quantity_has_one_number(chromium, server):
         window.wait("birthsim.frame.second !== null && birthsim.frame.time > 1")
         caption = "document.querySelectorAll('.rigs figcaption')[1].querySelector('i').textContent"
         window.page.locator("input[name=shown]").nth(1).check()
+        window.wait(f"{WRITTEN} === {caption}")
         for _ in range(20):
             assert window.value(f"{WRITTEN} === {caption}")
             window.live(0.1)
