@@ -17,7 +17,7 @@ LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 ENGINE = (
     "baselines/work/", "baselines/commands/", "baselines/about.py", "birthsim_env/files.py",
     "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "birthsim_env/drawing/",
-    "baselines/figures/", "studies/study.py", "studies/results.py",
+    "baselines/figures/", "studies/study.py", "studies/results.py", "studies/tables.py",
 )  # fmt: skip
 """What reads options, keeps pieces, describes controllers and draws, and decides no figure. It makes no result stale."""
 
