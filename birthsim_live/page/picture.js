@@ -1,12 +1,13 @@
 // The page's pictures, plots and figures as one picture: canvases are copied, words and marks are written where they stand.
 
-const LEFT_OUT = ".settings, .under, .hint, .banner, .scrubber, .unseen, script, style";
+const LEFT_OUT = ".settings, .under, .hint, .banner, .scrubber, .unseen, .handle, script, style";
 const PAINTED = ".readouts, .physics";
 
 /** A PNG of what can be seen of an element, as a Blob. */
 export function pictureOf(element) {
   const ratio = Math.min(window.devicePixelRatio || 1, 3);
-  const inside = [...element.children].filter((child) => child.offsetParent && !child.matches(LEFT_OUT)).map((child) => child.getBoundingClientRect());
+  const parts = [...element.children].flatMap((child) => (child.matches(".fold") ? [...child.children] : child));
+  const inside = parts.filter((part) => part.offsetParent && !part.matches(LEFT_OUT)).map((part) => part.getBoundingClientRect());
   const [left, top] = [Math.min(...inside.map((box) => box.left)), Math.min(...inside.map((box) => box.top))];
   const [right, bottom] = [Math.max(...inside.map((box) => box.right)), Math.max(...inside.map((box) => box.bottom))];
   const picture = document.createElement("canvas");
