@@ -216,7 +216,7 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
     assert landing.count("https://github.com/someone/birthsim") >= 2
     assert (site / "rig" / "card.png").exists()
     steps = (site / "explanation" / "steps.html").read_text("utf-8")
-    assert steps.count('src="../rig/index.html?embed=1&amp;') == 5
+    assert steps.count('src="../rig/index.html?embed=1&amp;') == 6
     assert "GLOSSARY" in (site / "_static" / "words.js").read_text("utf-8")
 
 
