@@ -115,7 +115,7 @@ def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
     moving = [conditions for conditions in all_conditions() if conditions.hand]
     assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
     assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
-    assert str(moving[0]) == "Circle, ideal sensors, drawn rig, moving hand: sine"
+    assert str(moving[0]) == "Circle, ideal sensors, randomised rig, moving hand: sine"
     assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
     assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
         *("Circle", "Probe", "Descent", "Forceps", "Dystocia", "Vacuum")
