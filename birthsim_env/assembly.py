@@ -216,7 +216,8 @@ def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Seque
     wrong = [name for name in unknown if name not in known]
     if wrong:
         # In Python's words: TorchRL, for one, looks for them.
-        raise TypeError(f"got an unexpected keyword argument {', '.join(map(repr, wrong))}; allowed: {', '.join(known)}")
+        said = ", ".join(f"{name!r}{near(name, known)}" for name in wrong)
+        raise TypeError(f"got an unexpected keyword argument {said}; allowed: {', '.join(known)}")
 
 
 def checked_actions(actions: Any, num_envs: int, size: int, clip: bool, arrays: Any = np) -> Any:

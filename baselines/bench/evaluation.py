@@ -81,7 +81,7 @@ def evaluate(
     lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
     episodes that are complete are returned.
     """
-    if episodes < 1:
+    if not (isinstance(episodes, int) and episodes >= 1):
         raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")
     return evaluate_worlds(environment, controller, name, range(seed, seed + episodes), None, progress, **arguments)
 

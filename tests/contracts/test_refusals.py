@@ -185,7 +185,7 @@ TABLE = [
     (partial(listed_option, "shut-valves"), "gain", (3.0,), "for shut-valves: no options"),
     (partial(listed_option, "backstepping-cartesian"), "weight_compensation", (True,), "for backstepping: pneumatic_gain, "),
     (partial(listed_option, "admittance"), "learn", (2.0,), "True or False"),
-    (evaluation, "episodes", (0, -3), "a whole number >= 1"),
+    (evaluation, "episodes", (0, -3, 2.5), "a whole number >= 1"),
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
     *((kind, "parameters", (42,), "None, a Parameters, a mapping or the path") for kind in (Plant, BacksteppingController)),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),

@@ -225,6 +225,7 @@ TABLE = {
     ("force has shape (1,)", "(2,)"): [linear(force=(1.0,))],
     ("frequency = 0", "above 0"): [lambda: linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])],
     ("unknown parameter 'mechanics.weight'", "mass, gravity"): [lambda: RIG.replace({"mechanics.weight": 0.9})],
+    ("'mechanics.mas' (did you mean 'mass'?)", "mass, gravity"): [lambda: RIG.replace({"mechanics.mas": 0.9})],
     ("unknown parameter section 'motor'", "geometry, cylinder1"): [lambda: RIG.replace({"motor.mass": 0.9})],
     ("Geometry.k1 = 0.43 with stroke 0.2 is impossible", ""): [lambda: RIG.replace({"geometry.d3": 0.9})],
     ("Geometry.k1 = 0.43 with stroke 0.4", ""): [

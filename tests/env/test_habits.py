@@ -49,8 +49,9 @@ def test_the_environment_made_again_from_its_specification_ends_at_the_same_step
 
 
 @pytest.mark.parametrize("make", [single, vector])
-def test_rig_and_time_step_are_attributes(make):
-    env = make(parameters={"mechanics": {"mass": 4.0}}, policy_period=0.02).unwrapped
+@pytest.mark.parametrize("heavier", [{"mechanics": {"mass": 4.0}}, {"mechanics.mass": 4.0}], ids=str)
+def test_rig_and_time_step_are_attributes(make, heavier):
+    env = make(parameters=heavier, policy_period=0.02).unwrapped
     assert env.dt == 0.02
     assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
 
