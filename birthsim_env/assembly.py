@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from birthsim_env import observation
-from birthsim_env.drawing.rendering import checked_size
+from birthsim_env.drawing.scene import checked_size
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation

@@ -16,7 +16,7 @@ from baselines.commands.settings import CONTROLLER, RANDOMIZE, Env, Parts, Rando
 from baselines.commands.worlds import check_environment, policy_of, with_options
 from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
-from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.files import make_folder, whole_file
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
@@ -99,12 +99,14 @@ def draw(
     errors: list[Array] = [np.array(one.errors) for one in takes]
     seen: Array = np.concatenate(errors)
     top = 1e-3 * float(np.ceil(1.05e3 * seen[np.isfinite(seen)].max(initial=0.5e-3)))
-    renderer = PairRenderer(rig, title, names, span, top)
+    from birthsim_env.drawing.pair import Pair  # late: it loads pygame
+
+    pair = Pair(rig, title, names, span, top)
     times = np.array([span[0] + SAMPLE * k for k in range(len(errors[0]))])
     frames = []
     for k, scenes in enumerate(zip(*(one.scenes for one in takes), strict=True)):
         until = round(k / rate / SAMPLE) + 1
-        frames.append(Image.fromarray(renderer.frame(scenes, times[:until], [error[:until] for error in errors])))
+        frames.append(Image.fromarray(pair.frame(scenes, times[:until], [error[:until] for error in errors])))
         progress(1)
     return frames
 

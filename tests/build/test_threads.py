@@ -25,7 +25,7 @@ from birthsim_env.parts.sensors.sensors import SENSORS
 from tests.build.targets import need_threads
 
 SEED = 2_000_000
-WAY = "birthsim_env.parts.references:_path_stage"
+WAY = "birthsim_env.parts.references:_path"
 LOOKS = {"baselines.bench.measures:_see", "baselines.bench.measures:_pay"}
 """What measures an evaluation."""
 

@@ -12,7 +12,8 @@ from baselines.commands import animate
 from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from baselines.staged import driving
-from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.drawing.pair import Pair
+from birthsim_env.drawing.scene import Scene
 from tests.console import call
 
 RIG = birthsim_env.Parameters()
@@ -35,7 +36,7 @@ def scene(**values):
 
 @pytest.fixture
 def pair():
-    return PairRenderer(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
+    return Pair(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
 
 
 @pytest.mark.parametrize("suffix", ["webp", pytest.param("gif", marks=pytest.mark.slow)])

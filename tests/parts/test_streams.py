@@ -92,12 +92,16 @@ RANGES = {
 }
 
 
+PAST = ("_state", "impacts", "_queue", "_shown", "_arrived", "_passed", "_late", "_readings")
+"""What looking leaves."""
+
+
 def arrays(simulation: Simulation):
     """Everything that a new episode draws, per part."""
     parts = (simulation.plant, simulation.trajectory, simulation.user_force, simulation.stiffness, simulation.sensors)
     for part in parts:
         for name, value in vars(part).items():
-            if isinstance(value, np.ndarray) and name not in ("_state", "impacts", "_queue", "_shown", "_arrived"):
+            if isinstance(value, np.ndarray) and name not in PAST:
                 yield f"{type(part).__name__}.{name}", value
 
 

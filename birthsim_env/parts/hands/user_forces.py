@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import FORCE, MOTION, TIME, Seen, World
 from birthsim_env.loop.stage import Stage, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.plant import checked
@@ -58,6 +59,21 @@ class UserForce:
         raise NotImplementedError(f"{type(self).__name__}.force(time, position, velocity) is missing; it returns N, (K, 2, N)")
 
 
+class CompiledForce(UserForce):
+    """A force that a ``stage`` of the closed loop computes."""
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces, stage = np.zeros((time.shape[0], 2, time.shape[1])), self.stage()
+        motion = [(np.concatenate([position, velocity]), MOTION)] if self.closed_loop else []
+        for now, force in zip(np.array(time, dtype=np.float64), forces, strict=True):
+            Loop(len(now), [(force, FORCE), *motion], [(now[None], TIME)], [stage]).run()
+        return forces
+
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        raise NotImplementedError
+
+
 def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) -> Array:
     """What a hand pushes with, N, (K, 2, N), at ``time`` (K, N), s; ``position`` and ``velocity`` (2, N) in m and m/s.
 
@@ -77,9 +93,11 @@ class Knot(Rows):
     force = rows("x y", "N", "of the hand")
 
 
-@helper
-def _interpolate(time: Array, knots: Array, counts: Array, force: Array, n: int) -> None:
-    """``knots`` (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
+@kernel
+def _interpolate(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Knots (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
+    knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
+    time, force = seen.time, world.force
     for i in range(n):
         low, high = 0, int(counts[i]) - 1
         while high - low > 1:
@@ -93,12 +111,6 @@ def _interpolate(time: Array, knots: Array, counts: Array, force: Array, n: int)
         part = max(0.0, min(1.0, (time[i] - before.time[i]) / span)) if span > 0.0 else 1.0
         for axis in range(2):
             force[axis, i] = before.force[axis, i] + part * (after.force[axis, i] - before.force[axis, i])
-
-
-@kernel
-def _knots_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
-    _interpolate(seen.time, knots, counts, world.force, n)
     return 0
 
 
@@ -122,7 +134,7 @@ def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
     return columns
 
 
-class ForceProfile(UserForce):
+class ForceProfile(CompiledForce):
     """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
@@ -152,15 +164,8 @@ class ForceProfile(UserForce):
                 put(knot, lanes, values)
             self._counts[one] = len(columns)
 
-    def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        forces = np.empty((time.shape[0], 2, time.shape[1]))
-        for now, force in zip(time, forces, strict=True):
-            _interpolate(now, self._knots, self._counts, force, len(now))
-        return forces
-
     def stage(self) -> Stage:
-        """``force``, compiled into the closed loop."""
-        return Stage(_knots_stage, tables=(self._knots, self._counts))
+        return Stage(_interpolate, tables=(self._knots, self._counts))
 
 
 class AlternatingSteps(ForceProfile):
