@@ -2,20 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import gymnasium
 import numpy as np
 from cyclopts import Parameter
 from PIL import Image
 from tqdm import tqdm
 
+from baselines.commands.episodes import driven
 from baselines.commands.settings import CONTROLLER, RANDOMIZE, Env, Parts, Randomize, RigFile, Seed, Sensors, Set, number
-from baselines.commands.worlds import check_environment, policy_of, with_options
-from baselines.registry import make_controller
-from baselines.staged import NO_ACTION, driving
+from baselines.commands.worlds import check_environment, with_options
+from baselines.staged import NO_ACTION
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.files import make_folder, whole_file
 from birthsim_env.parts.drawn.randomization import described
@@ -136,20 +134,17 @@ def main(settings: Settings) -> None:
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .webp or .gif")
     rig = load_parameters(settings.parameters)
     check_environment(settings.env)
-    make = partial(
-        gymnasium.make, settings.env, parameters=rig, sensors=settings.sensors, randomize=RANDOMIZE[settings.randomize],
-        policy_period=rig.electronics.control_period, **settings.parts(),
-    )  # fmt: skip
-    longest = make().get_wrapper_attr("duration")
+    names, randomize = with_options(settings.controller, settings.set), RANDOMIZE[settings.randomize]
+    envs = [
+        driven(settings.env, name, rig, sensors=settings.sensors, randomize=randomize, **settings.parts()) for name in names
+    ]
+    longest = envs[0].get_wrapper_attr("duration")
     if not 0 <= span[0] < span[1] <= longest or span[1] - span[0] < 1:
         raise ValueError(f"--begin {span[0]:g} --end {span[1]:g}; allowed: from 0 to {longest:g} s, a second apart or more")
-    names = with_options(settings.controller, settings.set)
-    options = [{"policy": policy_of(settings.env)} if name == "residual" else {} for name in names]
-    laws = [driving(make_controller(name, rig, **own), name) for name, own in zip(names, options, strict=True)]
-    print(described(rig, RANDOMIZE[settings.randomize], settings.sensors))
+    print(described(rig, randomize, settings.sensors))
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
-        takes = [take(make(actuation=law), settings.seed, span, settings.rate, bar.update) for law in laws]
+        takes = [take(env, settings.seed, span, settings.rate, bar.update) for env in envs]
     title = f"{takes[0].scenes[0].title}, in real time"
     with tqdm(total=len(takes[0].scenes), desc="drawing", unit=" frames", leave=False) as bar:
         frames = draw(takes, rig, title, names, span, settings.rate, bar.update)
