@@ -56,26 +56,6 @@ def test_every_input_has_a_name_and_every_choice_is_offered(window):
         assert offered == window.value(f"birthsim.hello.choices.{name}.length")
 
 
-def test_a_choice_changes_the_running_rig_without_a_break(window):
-    before = window.frame()
-    window.page.locator("select[name=scenario]").select_option("circle")
-    window.wait("birthsim.settings.scenario === 'circle'")
-    after = window.wait("birthsim.frame.time > " + str(before["time"] + 0.2) + " && birthsim.frame")
-    # Bridged: the target leaves where it was, it does not jump.
-    assert max(abs(a - b) for a, b in zip(after["position"], before["position"], strict=True)) < 0.1
-    window.page.locator("select[name=scenario]").select_option("probe")
-    window.wait("birthsim.settings.scenario === 'probe'")
-
-
-def test_keys_push(window):
-    window.page.keyboard.down("ArrowUp")
-    pushed = window.settle(least=15)
-    assert pushed["force"][1] == pytest.approx(20, abs=4)
-    assert pushed["force"][0] == pytest.approx(0, abs=2)
-    window.page.keyboard.up("ArrowUp")
-    window.wait("birthsim.frame.pointer === null")
-
-
 def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, server):
     with Window(chromium, server.url, NARROW, touch=True) as window:
         session = window.context.new_cdp_session(window.page)
@@ -115,11 +95,9 @@ def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, serve
         handle.tap()
         window.wait(f"{sheet}.clientHeight === 40")
         assert window.value("document.documentElement.scrollHeight") == NARROW["height"]
-        assert window.complaints == []
 
 
 def test_slow_motion(window):
-    window.page.locator("#speed").select_option("0.1")
-    window.wait("birthsim.state.speed === 0.1")
-    window.page.locator("#speed").select_option("1")
-    window.wait("birthsim.state.speed === 1")
+    for speed in ("0.1", "1"):
+        window.page.locator("#speed").select_option(speed)
+        window.wait(f"birthsim.state.speed === {speed}")
