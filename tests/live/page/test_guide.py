@@ -64,10 +64,7 @@ def test_the_settings_are_a_link(chromium, server):
         window.wait("location.search === ''")
 
 
-@pytest.mark.parametrize(
-    ("asked", "said"), [("mass=900", "mass = 900; allowed: 1.5 to 6 kg"), ("foo=1", 'foo = "1"; allowed: scenario')]
-)
-def test_a_link_that_asks_for_the_impossible_is_refused_by_name(chromium, server, asked, said):
-    with Window(chromium, f"{server.url}?{asked}") as window:
-        window.wait(f"document.querySelector('#notices').textContent.includes({json.dumps(said)})")
+def test_a_link_that_asks_for_the_impossible_is_refused_by_name(chromium, server):
+    with Window(chromium, f"{server.url}?mass=900") as window:
+        window.wait("document.querySelector('#notices').textContent.includes('mass = 900; allowed: 1.5 to 6 kg')")
         assert window.value("birthsim.settings.mass") == 3

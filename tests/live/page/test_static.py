@@ -15,7 +15,6 @@ from tests.live.rig.worker import run
 
 pytestmark = pytest.mark.slow
 
-LARGEST = 1.8e6  # bytes
 SILENT = """async () => {
   const { load } = await import(new URL("rig/birthsim.js", location));
   const { Hub } = await import(new URL("worker/hub.js", location));
@@ -54,10 +53,6 @@ def server(built):
     with Folder(built.parent) as served:
         served.url += f"{built.name}/"
         yield served
-
-
-def test_the_folder_is_small(built):
-    assert sum(path.stat().st_size for path in built.rglob("*") if path.is_file()) < LARGEST
 
 
 @pytest.mark.parametrize("compare", ["nothing", "backstepping"])
