@@ -49,6 +49,16 @@ def assert_equal(one, other):
         assert one is other is None
 
 
+def assert_same_refusal(words, *runs):
+    """Of the native environment, and of the one on a device."""
+    said = []
+    for run in runs:
+        with pytest.raises(ValueError, match=words) as refused:
+            run()
+        said.append(str(refused.value))
+    assert said[0] == said[1]
+
+
 def assert_same_run(here, there, steps, **options):
     rng = np.random.default_rng(2)
     for one, other in zip(*(env.reset(seed=SEED, options=options) for env in (here, there)), strict=True):
@@ -139,26 +149,21 @@ def test_tensors_are_taken_without_a_copy():
 @pytest.mark.slow
 @pytest.mark.parametrize("wrong", [np.zeros((7, 3)), np.full((7, 4), np.nan), np.full((7, 4), 1.1), "forward"])
 def test_wrong_actions_are_refused_in_the_same_words(wrong):
-    said = []
-    for device in (None, "host"):
-        env = made(device)
+    envs = [made(device) for device in (None, "host")]
+    for env in envs:
         env.reset(seed=SEED)
-        with pytest.raises(ValueError, match="action") as refused:
-            env.step(wrong)
-        said.append(str(refused.value))
-    assert said[0] == said[1]
+    assert_same_refusal("action", *(partial(env.step, wrong) for env in envs))
 
 
 @pytest.mark.slow
 def test_a_law_without_gains_is_explained_in_the_same_words():
-    said = []
-    for device in (None, "host"):
-        env = made(device, RESIDUAL, stiffness=StiffnessSchedule(closed_loop=(10.0,)))
+    soft = StiffnessSchedule(closed_loop=(10.0,))
+    envs = [made(device, RESIDUAL, stiffness=soft) for device in (None, "host")]
+    for env in envs:
         env.reset(seed=SEED)
-        with pytest.raises(ValueError, match="10") as refused:
-            env.step(np.zeros(env.action_space.shape))
-        said.append(str(refused.value))
-    assert said[0] == said[1]
+    assert_same_refusal("10", *(partial(env.step, np.zeros(env.action_space.shape)) for env in envs))
+    runs = evaluate, partial(evaluate_on, "host")
+    assert_same_refusal("10", *(partial(run, CIRCLE, law("backstepping"), "law", 2, SEED, stiffness=soft) for run in runs))
 
 
 class Blow(ForceProfile):
@@ -182,16 +187,6 @@ def test_an_evaluation_measures_the_same(lanes, world):
     assert json.dumps(here.to_dict()) == json.dumps(there.to_dict())
     assert_equal(np.concatenate(here.traces, axis=1), np.concatenate(there.traces, axis=1))
     assert bool(world) == (0 < sum(here.lost) < lanes)
-
-
-@pytest.mark.slow
-def test_an_evaluation_refuses_in_the_same_words():
-    said = []
-    for run in (evaluate, partial(evaluate_on, "host")):
-        with pytest.raises(ValueError, match="10") as refused:
-            run(CIRCLE, law("backstepping"), "law", 2, SEED, stiffness=StiffnessSchedule(closed_loop=(10.0,)))
-        said.append(str(refused.value))
-    assert said[0] == said[1]
 
 
 class Still(Trajectory):

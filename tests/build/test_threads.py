@@ -8,9 +8,8 @@ import pytest
 from llvmlite.binding import llvm_version_info
 
 from baselines.registry import LISTED
-from birthsim_build.code import ptx, threads
+from birthsim_build.code import threads
 from birthsim_build.code.compiler import LEAST_LLVM, compile_object
-from birthsim_build.code.elf import contents_of
 from birthsim_build.device.export import write_programs
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import controlled, pieces_of
@@ -22,7 +21,7 @@ from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.build.targets import need_threads
+from tests.build.targets import assert_fusing_changes_nothing, fill, need_threads
 
 SEED = 2_000_000
 WAY = "birthsim_env.parts.references:_path"
@@ -45,9 +44,7 @@ def both(lanes, **loop):
     episodes, other = begun(lanes, **loop), begun(3 if lanes == 2 else 2, **loop)
     pieces = pieces_of(episodes.simulation)
     made = Lanes(Host(), pieces, pieces_of(other.simulation), lanes)
-    for view, array in zip(made.views, pieces.arrays(), strict=True):
-        if view is not None:
-            view[...] = array
+    fill(made.views, pieces.arrays())
     return episodes.simulation, pieces, made
 
 
@@ -121,12 +118,6 @@ def test_what_is_not_exact_is_found(wrong):
         assert_exact(f"mul.rn.f64 %fd1, %fd2, %fd3;\n{wrong}")
 
 
-def test_a_users_python_is_refused_by_name():
-    episodes = Episodes(assemble(2, "circle", user_force=lambda time: (0.0, 0.0)))
-    with pytest.raises(ValueError, match=r"user_force = .*in Python; allowed on a device"):
-        pieces_of(episodes.simulation)
-
-
 CASES = {
     "openings": {"sensors": "ideal"},
     "flows of one valve": {"sensors": "honest", "scenario": "forceps", "action_mode": "flow", "valves": "one_valve"},
@@ -160,22 +151,15 @@ def test_a_hundred_thousand_threads():
     assert len(np.unique(simulation.plant.state[0])) > 99_000
 
 
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory):
-    """PTX of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
-    folder = tmp_path_factory.mktemp("ptx")
-    made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
-    made += [
-        begun(2, sensors=sensors, controller=name) for name in (*LISTED, "residual:circle") for sensors in ("ideal", "lab")
-    ]
-    functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
-    compile_object(sorted(functions | LOOKS), "ptx", folder / "all.o", threads=threads.Threads(1024))
-    return folder / "all.ptx"
-
-
 @pytest.mark.slow
-def test_ptx_of_all_stages_is_exact_and_alone(everything):
-    text = everything.read_text()
+def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
+    """Of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
+    made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
+    laws = (*LISTED, "residual:circle")
+    made += [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
+    functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
+    compile_object(sorted(functions | LOOKS), "ptx", tmp_path / "all.o", threads=threads.Threads(1024))
+    text = (tmp_path / "all.ptx").read_text()
     assert_exact(text)
     assert len(re.findall(r"^\.visible \.entry", text, re.MULTILINE)) == 3
     assert ".visible .func" not in text
@@ -186,17 +170,9 @@ def test_ptx_of_all_stages_is_exact_and_alone(everything):
 
 @pytest.mark.slow
 def test_fusing_is_given_no_chance(tmp_path):
-    if ptx.assembler() is None:
-        pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
     loop = pieces_of(begun(2, sensors="lab", controller="admittance-backstepping").simulation)
     compile_object(loop.functions, "ptx", tmp_path / "code.o", threads=threads.Threads(448))
-    made = {}
-    for fuses in ("true", "false"):
-        taken = ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
-        sections = contents_of((tmp_path / "code.cubin").read_bytes())
-        made[fuses] = {name: content for name, content in sections.items() if not name.startswith(".note")}
-    assert made["true"] == made["false"]
-    assert len(made["true"][".text.birthsim_advance"]) > 100_000
+    taken = assert_fusing_changes_nothing(tmp_path, "advance", 100_000)
     # 448 rows, what stages keep beside them, and registers that did not fit.
     assert taken["memory"] < 6 * 1024
     assert taken["spilled"] < 2 * 1024

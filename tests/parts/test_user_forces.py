@@ -97,31 +97,25 @@ def test_forceps_pulls_are_ramped_held_and_released(kind, seed, sizes, rates):
     assert np.abs(rows[times > previous + 0.01]).max() == 0.0
 
 
-def test_dystocia_pulls_are_those_of_clinicians():
-    times, rows = course(SCENARIOS["dystocia"].nominal()[1], 16.0)
-    size = np.hypot(*rows.T)
-    tops = [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]
-    np.testing.assert_allclose(tops, (84, 122, 163))
-    for seed in range(20):
-        times, rows = course(SCENARIOS["dystocia"].varied()[1], 16.0, seed)
-        size = np.hypot(*rows.T)
-        tops = [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]
-        assert len(tops) == 3
-        assert 75 <= min(tops) <= max(tops) <= 163
-        assert size[-1] == 0.0
-
-
-def tops_of(hand, duration, seed=0):
-    times, rows = course(hand, duration, seed)
+def tops_of(scenario, kind="nominal", seed=0):
+    """N. What is held of each pull; at the end nothing is left."""
+    times, rows = course(getattr(SCENARIOS[scenario], kind)()[1], SCENARIOS[scenario].duration, seed)
     size = np.hypot(*rows.T)
     assert size[-1] == 0.0
     return [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]
 
 
+def test_dystocia_pulls_are_those_of_clinicians():
+    np.testing.assert_allclose(tops_of("dystocia"), (84, 122, 163))
+    tops = np.array([tops_of("dystocia", "varied", seed) for seed in range(20)])
+    assert tops.shape == (20, 3)
+    assert 75 <= tops.min() <= tops.max() <= 163
+
+
 @pytest.mark.slow
 def test_vacuum_pulls_are_those_of_births_as_far_as_the_rig_holds_them():
-    np.testing.assert_allclose(tops_of(SCENARIOS["vacuum"].nominal()[1], 24.0), (176, 225, 241))
-    tops = np.array([tops_of(SCENARIOS["vacuum"].varied()[1], 24.0, seed) for seed in range(100)])
+    np.testing.assert_allclose(tops_of("vacuum"), (176, 225, 241))
+    tops = np.array([tops_of("vacuum", "varied", seed) for seed in range(100)])
     assert tops.shape == (100, 3)
     assert 5 <= tops.min() < 20
     assert tops.max() == pytest.approx(225.0)
