@@ -5,18 +5,15 @@ chambers so large that they act like the open air.
 """
 
 import math
-from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
 from birthsim_env.physics import friction
-from birthsim_env.physics.compiled.lanes import ELASTO_PLASTIC, PRESSURES, V1, V2, Y2, Z1, Z2, Array
-from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y2, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.physics.test_friction import FS, FV, INSTANTS, MOTIONS, S0, S1, PlantFriction, along, follows, stribeck
@@ -118,54 +115,6 @@ def test_presliding_is_a_spring_without_drift_where_lugre_drifts() -> None:
     assert ends["lugre"] > 10 * spring
 
 
-def slow_push(portion: float, ratio: float = RATIO) -> tuple[float, float]:
-    """Way of the piston under ``portion`` of Fs, reached slowly, m: spring, and integral of alpha q/(1 - alpha q) dz."""
-    full = FS[1] / S0
-
-    def creep(z: float) -> float:
-        q = fraction(z, 1.0, full, ratio) * z / full
-        return q / (1 - q)
-
-    return portion * full, quad(creep, min(ratio, portion) * full, portion * full)[0]
-
-
-@pytest.mark.parametrize("portion", [0.5, 0.69, 0.8, 0.9])
-def test_what_a_slow_push_leaves_behind(portion: float) -> None:
-    """Up to the break-away deflection nothing, beyond it the plastic part."""
-    plant, ramp = one_piston("elasto_plastic"), np.linspace(0, portion * FS[1], 4000)
-    spring, plastic = slow_push(portion)
-    assert pushed(plant, ramp, 20.0) == pytest.approx(spring + plastic, rel=2e-3)
-    assert pushed(plant, np.append(ramp[::-1], np.zeros(100)), 20.5) == pytest.approx(plastic, rel=1e-2, abs=1e-9)
-
-
-@pytest.mark.parametrize("ratio", [0.1, 0.7, 0.9])
-def test_it_breaks_away_at_the_static_level(ratio: float) -> None:
-    """0.5 N/s: still held 5 % below Fs, gone by millimetres 3 % above."""
-    plant, level = one_piston("elasto_plastic", breakaway_ratio=ratio), FS[1]
-    below = pushed(plant, np.linspace(0, 0.95 * level, 8000), 0.95 * level / 0.5)
-    assert below == pytest.approx(sum(slow_push(0.95, ratio)), rel=0.01)
-    assert pushed(plant, np.linspace(0.95 * level, 1.03 * level, 800), 0.08 * level / 0.5) > 5e-3
-
-
-def test_held_by_friction_nothing_creeps_for_ten_seconds() -> None:
-    """The whole rig, valves shut, 3 N on both axes, constant or with 4 N of dither at 10 Hz on x.
-
-    For the first 5 s the chambers, compressed by the push, still cool down.
-    """
-    laws = ("elasto_plastic", "elasto_plastic", "lugre", "lugre")
-    plant = Plant([Parameters().replace({"friction.law": law, "valves.leakage_ratio": 0.0}) for law in laws], 4)
-    push, seen = np.full((5000, 2, 4), 3.0), [plant.end_effector()[:2]]
-    push[:, 0, 1::2] += 4 * np.sin(2 * math.pi * 10 * np.arange(5000) / 1000)[:, None]
-    for _ in range(3):
-        plant.advance(np.zeros((4, 4)), push, 5.0)
-        seen.append(plant.end_effector()[:2])
-    moved, crept = np.linalg.norm(seen[1] - seen[0], axis=0), np.linalg.norm(seen[3] - seen[1], axis=0)
-    assert np.all((moved[:2] > 5e-5) & (moved[:2] < 5e-4)), moved
-    assert np.all(crept[:2] < 1e-9), crept
-    assert crept[2] < 1e-8, "constant, the push moves LuGre no further either"
-    assert crept[3] > 5e-4, crept
-
-
 @pytest.mark.parametrize("ratio", [0.05, 0.7, 0.9])
 def test_bristle_settles_at_every_speed_with_the_plants_steps(ratio: float) -> None:
     """Pistons too heavy to be braked, bristles leaning the wrong way: 6 ms later they lean the right way, at G(v)/s0."""
@@ -176,30 +125,3 @@ def test_bristle_settles_at_every_speed_with_the_plants_steps(ratio: float) -> N
     plant.advance(np.zeros((4, 6)), np.zeros((2, 6)), 0.006)
     for k, (row, v) in enumerate(((Z1, plant.state[V1]), (Z2, plant.state[V2]))):
         np.testing.assert_allclose(plant.state[row], [math.copysign(stribeck(s, k), s) / S0 for s in v], rtol=1e-3)
-
-
-def test_balance_while_moving_is_steady_sliding() -> None:
-    plant = Plant(Parameters().replace(LAW), 3)
-    speed = np.array([[0.12, -0.01, 0.0], [-0.2, 0.5, 0.0]])
-    state = balanced_state(plant.lane_parameters, np.zeros((2, 3)), speed)
-    expected = [[math.copysign(stribeck(v, k), v) / S0 if v else 0.0 for v in speed[k]] for k in (0, 1)]
-    np.testing.assert_allclose(state[[Z1, Z2]], expected, rtol=1e-12)
-    like_lugre = balanced_state(Plant(num_envs=3).lane_parameters, np.zeros((2, 3)), speed)
-    np.testing.assert_array_equal(state, like_lugre, "sliding steadily, the laws are one, and so are the pressures")
-    rates = plant.derivatives(state, np.zeros((4, 3)), np.zeros((2, 3)))
-    assert np.abs(rates[[Z1, Z2]]).max() < 1e-12
-
-
-def test_an_environment_takes_it_from_parameters_and_from_a_file(tmp_path: Path) -> None:
-    rig, path = Parameters().replace({**LAW, "friction.breakaway_ratio": 0.6}), tmp_path / "rig.toml"
-    path.write_text("[friction]\nlaw = 'elasto_plastic'\nbreakaway_ratio = 0.6\n")
-    observations = []
-    for parameters in (rig, str(path), None):
-        env = gymnasium.make("BirthSIM/Probe-v2", parameters=parameters)
-        env.reset(seed=3)
-        for _ in range(30):
-            observation, *_ = env.step(np.array([0.3, -0.3, 0.3, -0.3], dtype=np.float32))
-        observations.append(observation)
-        assert env.unwrapped.simulation.plant.lane_parameters[ELASTO_PLASTIC, 0] == (parameters is not None)
-    np.testing.assert_array_equal(observations[0], observations[1])
-    assert np.any(observations[0] != observations[2])

@@ -16,19 +16,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from birthsim_env.physics import friction
-from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y1, Y2, Z1, Z2, Array
+from birthsim_env.physics.compiled.lanes import V1, V2, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
+from tests.physics.rigs import LAWS, NO_FRICTION
 
 FC, FS, VS, FV = (12.0, 15.0), (12.0 * 1.33, 15.0 * 1.33), 0.015, 35.0
 S0, S1 = 5e4, 150.0
 """Assumed: levels of cylinders 1 and 2, Stribeck speed, viscous friction, bristle stiffness and damping."""
-
-NO_FRICTION = {
-    **{f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "viscous")},
-    "friction.law": "coulomb",
-}
 
 
 def stribeck(v: float, cylinder: int) -> float:
@@ -104,26 +100,6 @@ def test_lugre_follows_the_textbook_along_a_motion(amplitude: float, frequency: 
     follows(PlantFriction(INSTANTS), textbook_rate, amplitude, frequency)
 
 
-@pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
-def test_steady_sliding_is_on_the_stribeck_curve(law: str) -> None:
-    """Including speeds above the rate limit of the bristle, which must not change the steady force."""
-    speeds = np.concatenate([-np.geomspace(1e-3, 6, 25), np.geomspace(1e-3, 6, 25)])
-    plant, z = PlantFriction(50, {"friction.law": law}), np.zeros((2, 50))
-    v = np.stack([speeds, speeds])
-    step = 0.05 / np.maximum(S0 * np.abs(v) / FS[0], 1.0)
-    for _ in range(1500):
-        z = z + step * plant(v, z)[1]
-    expected = np.array([[math.copysign(stribeck(s, k), s) + FV * s for s in speeds] for k in (0, 1)])
-    force, rate = plant(v, z)
-    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-6)
-    assert np.abs(rate).max() < 1e-9
-    for k in (0, 1):
-        assert max(expected[k, speeds > 0]) > expected[k, speeds > 0][13], "the curve dips: fast enough, friction falls"
-        ends = [friction.steady_deflection(s, stribeck(s, k), S0) for s in speeds]
-        np.testing.assert_allclose(z[k], ends, rtol=1e-9)
-    assert friction.steady_deflection(0.0, FS[0], S0) == 0
-
-
 @given(v=st.floats(-10, 10), z=st.floats(-4e-4, 4e-4), level=st.floats(0.01, 40))
 def test_rate_is_textbook_below_the_limit_and_limited_above(v: float, z: float, level: float) -> None:
     rate = friction.bristle_rate(v, z, level, S0)
@@ -132,36 +108,6 @@ def test_rate_is_textbook_below_the_limit_and_limited_above(v: float, z: float, 
     else:
         toward = math.copysign(level / S0, v) - z
         assert rate == pytest.approx(8000 * toward, rel=1e-6, abs=1e-9)
-
-
-@pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
-def test_presliding_stiffness_is_s0(law: str) -> None:
-    """A tenth of a micrometre at 1 um/s: the first stretch of the spring, without noticeable damping."""
-    plant, speed, z = PlantFriction(1, {"friction.law": law}), np.full((2, 1), 1e-6), np.zeros((2, 1))
-    for _ in range(100):
-        z = z + 1e-3 * plant(speed, z)[1]
-    force, _ = plant(speed, z)
-    damping = (S1 + FV) * 1e-6
-    np.testing.assert_allclose((force - damping) / 1e-7, S0, rtol=1e-3)
-
-
-def test_a_push_below_the_breakaway_force_gives_and_springs_back() -> None:
-    """5 N put slowly on the stuck cylinder 2 and taken off again: dy = dz/(1 - s0 z/Fs), then back along dz/(1 + s0 z/Fs)."""
-    plant = Plant(Parameters().replace({"mechanics.gravity": 0.0, "valves.leakage_ratio": 0.0}))
-    push = np.zeros((200, 2, 1))
-    push[:, 0, 0] = np.linspace(0, 5, 200)
-    moved = []
-    for ramp in (push, push[::-1]):
-        plant.advance(np.zeros((4, 1)), ramp, 2.0)
-        moved.append(plant.state[Y2, 0])
-    breakaway, air = FS[1], 2500.0  # 2300 N/m at k = 1.2, up to 2700 N/m adiabatic
-    carried, left = 5 - air * moved[0], -air * moved[1]
-    forward = -breakaway / S0 * math.log(1 - carried / breakaway)
-    backward = breakaway / S0 * math.log((1 + carried / breakaway) / (1 + left / breakaway))
-    assert moved[0] == pytest.approx(forward, rel=0.02)
-    assert moved[1] == pytest.approx(forward - backward, rel=0.1)
-    plant.advance(np.zeros((4, 1)), [[30.0], [0.0]], 0.2)
-    assert plant.state[Y2, 0] > 1e-3, "30 N break it away"
 
 
 @pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
@@ -175,58 +121,20 @@ def test_bristle_stays_bounded_by_the_breakaway_deflection(law: str) -> None:
     assert np.all(largest > np.array(FC) / S0), "some lane must have come near the bound"
 
 
-@pytest.mark.parametrize("speed", [0.5, 0.02, -0.02, -0.5])
-def test_coulomb_law_decelerates_by_fc_and_fv_v(speed: float) -> None:
-    plant = PlantFriction(1, {"friction.law": "coulomb"})
-    force, rate = plant(np.full((2, 1), speed), np.full((2, 1), 1e-4))
-    np.testing.assert_allclose(force[:, 0], [math.copysign(fc, speed) + FV * speed for fc in FC], rtol=1e-10)
+def test_coulomb_law_is_fc_and_fv_v_with_a_line_through_rest() -> None:
+    speeds = np.array([0.5, 0.02, 0.002, 0.0, -0.001, -0.02, -0.5])
+    plant = PlantFriction(7, {"friction.law": "coulomb", "friction.sign_speed": 0.004})
+    force, rate = plant(np.array([speeds, speeds]), np.full((2, 7), 1e-4))
+    expected = [fc * np.clip(speeds / 0.004, -1, 1) + FV * speeds for fc in FC]
+    np.testing.assert_allclose(force, expected, rtol=1e-10, atol=1e-10)
     assert np.all(rate == 0), "no bristle in (4)"
 
 
-def test_coulomb_law_is_a_line_through_rest() -> None:
-    plant = PlantFriction(3, {"friction.law": "coulomb", "friction.sign_speed": 0.004})
-    force, _ = plant(np.array([[-0.001, 0.0, 0.002]] * 2), np.zeros((2, 3)))
-    np.testing.assert_allclose(force, [[-fc / 4 - 0.035, 0.0, fc / 2 + 0.07] for fc in FC], rtol=0, atol=1e-10)
-
-
-def test_piston_coasts_as_long_as_coulomb_and_viscous_friction_let_it() -> None:
-    """m dv/dt = -Fc - Fv v stops v0 after (m/Fv) ln(1 + Fv v0/Fc); the chambers are kept open to the atmosphere."""
-    wide_open = {"mechanics.gravity": 0.0, "chambers.dead_volume": 10.0}
-    rig = Parameters().replace({"friction.law": "coulomb", "friction.sign_speed": 0.001, **wide_open})
-    plant = Plant(rig)
-    plant.state[list(PRESSURES)] = rig.air.atmospheric_pressure
-    plant.state[V2] = 0.4
-    stop = 3.0 / FV * math.log(1 + FV * 0.4 / FC[1])
-    plant.advance(np.zeros((4, 1)), np.zeros((2, 1)), 0.98 * stop)
-    assert plant.state[V2, 0] > 0.002
-    plant.advance(np.zeros((4, 1)), np.zeros((2, 1)), 0.04 * stop)
-    assert abs(plant.state[V2, 0]) < 0.001
-
-
-@pytest.mark.parametrize("law", ["lugre", "coulomb", "elasto_plastic"])
+@pytest.mark.parametrize("law", LAWS)
 def test_no_friction_when_switched_off(law: str) -> None:
     plant = PlantFriction(3, {**NO_FRICTION, "friction.law": law})
     force, _ = plant(np.array([[-0.7, 0.0, 2.5]] * 2), np.zeros((2, 3)))
     assert np.abs(force).max() <= (0.0 if law == "coulomb" else 1e-7)
-
-
-def test_frictionless_rig_keeps_its_energy() -> None:
-    """Swinging on cylinder 1 with huge chambers at atmospheric pressure: kinetic plus potential energy stay, LuGre selected."""
-    changes = {"friction.law": "lugre", "chambers.dead_volume": 100.0, "valves.leakage_ratio": 0.0}
-    rig = Parameters().replace({**NO_FRICTION, **changes})
-    plant = Plant(rig)
-    plant.state[list(PRESSURES)] = rig.air.atmospheric_pressure
-    plant.state[Y1] = 0.05
-    plant.state[V1], plant.state[V2] = -0.5, 0.3
-
-    def energy() -> float:
-        _, y, vx, vy = plant.end_effector()[:, 0]
-        return 1.5 * (vx**2 + vy**2) + 3 * 9.81 * y
-
-    start = energy()
-    plant.advance(np.zeros((4, 1)), np.zeros((2, 1)), 0.15)
-    assert abs(plant.state[Y1, 0]) < 0.1
-    assert energy() == pytest.approx(start, abs=1e-5)
 
 
 @given(v=st.floats(-5, 5), cylinder=st.sampled_from([0, 1]))

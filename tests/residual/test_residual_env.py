@@ -249,8 +249,7 @@ def test_observations_end_with_the_last_action_and_what_the_law_remembers(argume
 def test_observations_tell_what_the_pistons_met_as_the_rigs_owner_describes_it(sensors):
     env = lanes(3, PROBE, sensors=sensors, randomize=True, policy_period=1e-3)
     observation, _ = env.reset(seed=5)
-    observer = UnexplainedForceObserver(RIG)
-    observer.reset(np.ones(3, dtype=np.bool_))
+    observer = UnexplainedForceObserver(RIG, 3)
     for _ in range(400):
         observer.update(env.measurement)
         observation = env.step(np.zeros((3, 2), np.float32))[0]

@@ -14,25 +14,9 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array
-from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
-from birthsim_env.physics.rig.parameters import Parameters
 
 ROOT = Path(__file__).parents[3]
-RANDOMIZED = {
-    "mechanics.mass": (2, 5),
-    "cylinder1.coulomb_friction": (6, 25),
-    "cylinder2.viscous_friction": (10, 60),
-    "chambers.dead_volume": (5e-6, 25e-6),
-    "valves.time_constant": (0.0015, 0.008),
-}
-
-
-def varied_rigs(lanes: int, rng: np.random.Generator) -> list[Parameters]:
-    draws = {name: rng.uniform(*limits, lanes) for name, limits in RANDOMIZED.items()}
-    laws = ["lugre", "coulomb", "elasto_plastic"]
-    changes = ({**{k: float(v[i]) for k, v in draws.items()}, "friction.law": laws[i % 3]} for i in range(lanes))
-    return [Parameters().replace(change) for change in changes]
 
 
 def idle(lanes: int) -> tuple[Array, Array]:
@@ -100,27 +84,6 @@ def test_advance_refuses_by_name_and_leaves_the_state(command: Any, force: Any, 
     np.testing.assert_array_equal(plant.state, before)
 
 
-def test_a_lane_of_a_thousand_is_the_plant_alone_bit_for_bit() -> None:
-    lanes, rng = 1000, np.random.default_rng(0)
-    rigs = varied_rigs(lanes, rng)
-    crowd = Plant(rigs, lanes)
-    commands, forces = rng.uniform(-1, 1, (20, 4, lanes)), rng.uniform(-100, 100, (20, 2, lanes))
-    hit = np.zeros((2, lanes))
-    for command, force in zip(commands, forces, strict=True):
-        crowd.advance(command, force, 0.01)
-        hit = np.maximum(hit, crowd.impacts)
-    # The first and last lane of blocks of 32 and of the incomplete one, and some others.
-    for i in (0, 1, 30, 31, 32, 63, 500, 511, 512, 990, 991, 992, 993, 998, 999, *rng.integers(0, lanes, 60)):
-        alone, alone_hit = Plant(rigs[i]), np.zeros((2, 1))
-        for command, force in zip(commands, forces, strict=True):
-            alone.advance(command[:, [i]], force[:, [i]], 0.01)
-            alone_hit = np.maximum(alone_hit, alone.impacts)
-        np.testing.assert_array_equal(alone.state[:, 0], crowd.state[:, i])
-        np.testing.assert_array_equal(alone.end_effector()[:, 0], crowd.end_effector()[:, i])
-        np.testing.assert_array_equal(alone_hit[:, 0], hit[:, i])
-    assert np.ptp(crowd.piston, axis=1).min() > 0.05, "the lanes must differ"
-
-
 def test_force_samples_are_successive_calls() -> None:
     rng = np.random.default_rng(1)
     command, forces = rng.uniform(-1, 1, (4, 5)), rng.uniform(-150, 150, (8, 2, 5))
@@ -143,19 +106,6 @@ def test_steps_are_never_longer_than_the_default_and_fill_the_duration() -> None
     plant.advance(np.ones((4, 1)), np.zeros((2, 1)), 0.9e-3)
     h = 0.225e-3 / 0.004
     assert plant.state[14, 0] == pytest.approx(1 - (1 - h + h**2 / 2 - h**3 / 6 + h**4 / 24) ** 4, rel=1e-13)
-
-
-def test_nothing_moves_at_balance() -> None:
-    lanes, rng = 200, np.random.default_rng(2)
-    rigs = [rig.replace({"valves.leakage_ratio": 0.0}) for rig in varied_rigs(lanes, rng)]
-    plant = Plant(rigs, lanes)
-    piston = rng.uniform(-0.95, 0.95, (2, lanes)) * [[0.1], [0.2]]
-    plant.state[:] = balanced_state(plant.lane_parameters, piston, pneumatic_stiffness=rng.uniform(500, 9000, (2, lanes)))
-    assert np.abs(plant.derivatives(plant.state, *idle(lanes))[:4]).max() < 1e-11
-    start = plant.state.copy()
-    plant.advance(*idle(lanes), 1.0)
-    np.testing.assert_allclose(plant.piston, piston, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(plant.state, start, rtol=1e-9, atol=1e-11)
 
 
 DISASSEMBLE = """

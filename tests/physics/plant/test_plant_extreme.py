@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.physics.plant.test_plant_properties import RANGES
 
 BORE, RING = math.pi * 0.025**2 / 4, math.pi * (0.025**2 - 0.010**2) / 4
 POLICY_PERIOD = 0.01
@@ -26,7 +26,7 @@ def corner_rigs(lanes: int, rng: np.random.Generator) -> list[Parameters]:
     """Every randomised field at one of its ends, LuGre and Coulomb friction in turn."""
     rigs = []
     for lane in range(lanes):
-        changes: dict[str, Any] = {name: float(rng.choice(ends)) for name, ends in RANGES.items()}
+        changes: dict[str, Any] = {name: float(rng.choice(ends)) for name, ends in documented_ranges(Parameters()).items()}
         rigs.append(Parameters().replace({**changes, "friction.law": ("lugre", "coulomb")[lane % 2]}))
     return rigs
 
