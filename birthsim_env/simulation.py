@@ -106,7 +106,8 @@ class Simulation:
         self._seen: Array = np.zeros((at.ASKED, num_envs))
         self._samples: Array = np.zeros((0, 2, num_envs))
         self._sample = 0
-        self._ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        self.ranges: Ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        """What is drawn of the rig."""
         self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
         self.made: tuple[Any, ...] = ()
@@ -183,8 +184,8 @@ class Simulation:
         """
         chosen = np.flatnonzero(lanes)
         for block, streams in worlds(chosen, seeds, episodes):
-            if self._ranges:
-                columns = draw_columns(self.parameters, self._ranges, streams["parameters"], len(block))
+            if self.ranges:
+                columns = draw_columns(self.parameters, self.ranges, streams["parameters"], len(block))
                 self.plant.lane_parameters[:, block] = columns
             begin(self.trajectory, block, streams["reference"])
             begin(self.user_force, block, streams["user_force"])

@@ -88,8 +88,10 @@ def plant_stage(rigs: Array, memory: Array, period: float) -> Stage:
 
 
 class Start(Rows):
-    """Where an episode begins."""
+    """With what an episode begins."""
 
+    seed = row("1", "of the lane, the bits of a whole number")
+    episode = row("1", "number of the episode, likewise")
     elsewhere = row("1", "1 to begin at a place, at rest, instead of on the target")
     place = rows("x y", "m", "that place, of the end effector")
 
@@ -137,7 +139,7 @@ def _rest(world: World, seen: Seen, memory: FurtherStates, constants: int, table
 def start_stages(start: Array, nominal: Array, plant: Stage) -> list[Stage]:
     """What puts the ``plant`` where episodes begin, once target and setpoints are known, to the bits of ``Simulation.begin``.
 
-    ``start`` (3, N) is ``Start``, ``nominal`` (PARAMETERS,) the rig as described.
+    ``start`` (``Start.size``, N) is ``Start``, ``nominal`` (PARAMETERS,) the rig as described.
     """
     first = Stage(_start, Described.numbers(rig=nominal), start)
     return [first, Stage(_rest, memory=plant.memory)] if plant.function is _optional_plant else [first]
