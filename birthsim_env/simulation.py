@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 Part = Stage | Callable[[int], None]
 
+LOOKS = ("target", "setpoints", "hand", "jumps", "sensors")
+"""Parts that run where an episode begins."""
+
 
 class Runs(Protocol):
     """What runs control periods, on some threads; returns how many lanes and periods a stage could not serve."""
@@ -103,7 +106,8 @@ class Simulation:
         self._seen: Array = np.zeros((at.ASKED, num_envs))
         self._samples: Array = np.zeros((0, 2, num_envs))
         self._sample = 0
-        self._ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        self.ranges: Ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        """What is drawn of the rig."""
         self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
         self.made: tuple[Any, ...] = ()
@@ -180,8 +184,8 @@ class Simulation:
         """
         chosen = np.flatnonzero(lanes)
         for block, streams in worlds(chosen, seeds, episodes):
-            if self._ranges:
-                columns = draw_columns(self.parameters, self._ranges, streams["parameters"], len(block))
+            if self.ranges:
+                columns = draw_columns(self.parameters, self.ranges, streams["parameters"], len(block))
                 self.plant.lane_parameters[:, block] = columns
             begin(self.trajectory, block, streams["reference"])
             begin(self.user_force, block, streams["user_force"])
@@ -290,8 +294,10 @@ class Simulation:
                 rows[row : row + len(array)] = array
         return world, seen
 
-    def parts(self) -> dict[str, list[Part]]:
-        """What a control period runs, in this order: stages, and methods that call what a user has written in Python."""
+    def parts(self, begins: bool = False) -> dict[str, list[Part]]:
+        """What a control period runs, in this order: stages, and methods that call what a user has written in Python.
+
+        Those of ``LOOKS`` also run where an episode ``begins``."""
         senses = [self._compiled(self.sensors, "measure", self._measure)]
         if not self.force_sensor:
             senses.append(no_force_stage())
@@ -302,7 +308,7 @@ class Simulation:
             "target": [self._compiled(self.trajectory, "sample", self._follow)],
             "setpoints": [self._compiled(self.stiffness, "sample", self._set)],
             "hand": [self._compiled(self.user_force, "force", self._push)],
-            "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, False)],
+            "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, begins)],
             "sensors": senses,
         }
 
@@ -317,10 +323,9 @@ class Simulation:
         made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in every))
         if self._loop is not None and made == self.made:
             return
-        begins = jump_stage(self.period, self.user_force.jump_rate, self._jumps, True)
-        looks = [*parts["target"], *parts["setpoints"], *parts["hand"]]
+        looks = [part for name, group in self.parts(begins=True).items() if name in LOOKS for part in group]
         self._loop = MixedLoop(lanes, *places, every, self.closing)
-        self._look = MixedLoop(lanes, *places, [*looks, begins, *parts["sensors"]], self.beginning)
+        self._look = MixedLoop(lanes, *places, looks, self.beginning)
         self.made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:

@@ -102,8 +102,8 @@ def begin_one_by_one(simulation: Simulation, lanes, seeds, episodes):
     """As it was before lanes began together, with NumPy's generators."""
     for lane in lanes:
         world = {name: stream(seeds[lane], int(episodes[lane]), name) for name in STREAMS}
-        if simulation._ranges:
-            drawn = draw_parameters(simulation.parameters, simulation._ranges, world["parameters"])
+        if simulation.ranges:
+            drawn = draw_parameters(simulation.parameters, simulation.ranges, world["parameters"])
             simulation.plant.lane_parameters[:, lane] = parameter_column(drawn)
         simulation.trajectory.begin(lane, world["reference"])
         simulation.user_force.begin(lane, world["user_force"])

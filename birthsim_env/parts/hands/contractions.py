@@ -79,7 +79,8 @@ class Contractions(ForceProfile):
         waves = np.array([exact.direction(math.pi * bumps * middle)[1] for bumps in range(least, most + 1)])
         for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
             size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
-            push = waves[np.broadcast_to(rng.integers(least, most + 1), lanes.shape) - least].T
+            bumps = np.broadcast_to(rng.integers(least, most + 1), lanes.shape, subok=True)
+            push = np.select([bumps == count for count in range(least, most + 1)], list(waves[:, :, None]))
             # Less of the contraction, so that the sum with its pushes peaks near its size.
             force = size * ((1.0 - fraction) * swell[:, None] * swell[:, None] + fraction * push * push)
             contraction[:, 1, lanes], contraction[:, 2, lanes] = force * x, force * y

@@ -114,17 +114,23 @@ def _interpolate(world: World, seen: Seen, memory: int, constants: int, tables: 
     return 0
 
 
-def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
+_NUMBERS = np.empty(0)
+
+
+def _checked_knots(name: str, knots: Any, lanes: int = 1, like: Array = _NUMBERS) -> Array:
     """Knots as an array (M, 3, L), or a ``ValueError`` that names them, of the first lane that is wrong.
 
-    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,).
+    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,), or symbols as those of an array that is ``like``
+    them, which nobody can check.
     """
     try:
-        columns = np.empty((len(knots), 3, lanes))
+        columns = np.empty_like(like, shape=(len(knots), 3, lanes))
         for rows, knot in zip(columns, knots, strict=True):
             put(rows, slice(None), knot)
     except (TypeError, ValueError, OverflowError):
         columns = np.empty((0, 3, lanes))
+    if columns.dtype == object:
+        return columns
     late = columns[1:, 0] < columns[:-1, 0]
     if len(columns) == 0 or late.any() or not np.isfinite(columns).all():
         if lanes > 1:
@@ -156,7 +162,7 @@ class ForceProfile(CompiledForce):
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         for one, own in served(self.knots, lane, rng):
             lanes = np.atleast_1d(one)
-            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes))
+            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes), self._knots)
             missing = len(columns) - len(self._knots)
             if missing > 0:
                 self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])

@@ -19,7 +19,7 @@ from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors.noise import happens, noise_of, uniform
 from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Figures, Shared, Unit, field, shared, shift, work_out
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel, over
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.electronics import Electronics
@@ -208,17 +208,17 @@ class BoardSensors:
         """Start a new episode in one lane."""
         lanes: NDArray[Any] = np.atleast_1d(lane)
         self._keys[lane] = rng.integers(2**64, dtype=np.uint64)
-        unit = np.asarray(rng.uniform(-1.0, 1.0, Unit.size)).reshape(Unit.size, -1)
-        figures = Figures(np.empty((Figures.size, len(lanes))))
+        unit = np.asanyarray(rng.uniform(-1.0, 1.0, Unit.size)).reshape(Unit.size, -1)
+        figures = Figures(np.empty_like(unit, shape=(Figures.size, len(lanes))))
         for name in FIGURES:
             getattr(figures, name)[:] = getattr(self._electronics, name)
         for name, (low, high) in self._ranges.items():
             getattr(figures, name)[:] = rng.uniform(low, high)
-        errors = Errors(np.empty((Errors.size, len(lanes))))
-        work_out(figures, Unit(unit), Shared(self._shared), errors)
+        errors = Errors(np.empty_like(unit, shape=(Errors.size, len(lanes))))
+        over(work_out, figures, Unit(unit), Shared(self._shared), errors)
         # Drawn last, so that all else is drawn as on a rig without such a sensor.
         most = np.repeat([self._electronics.acceleration_bias, self._electronics.acceleration_gain_error], 2)
-        drawn = most[:, None] * np.asarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
+        drawn = most[:, None] * np.asanyarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
         errors.acceleration_bias[:], errors.acceleration_gain[:] = drawn[:2], drawn[2:]
         self._errors[:, lanes] = errors.rows
 
