@@ -149,7 +149,7 @@ class Episodes:
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """Whether the episodes are successful so far, (N,): see ``birthsim_env.success``."""
+        """Whether the episodes are successful so far, (N,): see ``birthsim_env.reward``."""
         return np.asarray(self._outcome.ends[1] > 0.0)
 
     def outcome_rows(self) -> list[tuple[Array, list[str]]]:

@@ -16,7 +16,7 @@ from baselines.registry import make_controller
 from birthsim_env.files import make_folder, whole_file, whole_results, write_json
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.success import SETTLED
+from birthsim_env.reward import SETTLED
 
 PICTURE: dict[str, Any] = {"render_mode": "rgb_array", "picture_size": (1280, 960)}
 PICTURE_TIME = 1.8
