@@ -10,9 +10,9 @@ from PIL import Image
 import birthsim_env
 from baselines.commands.episodes import driven, record
 from baselines.commands.settings import Configured, Controller, RigFile, Sensors, Set
-from baselines.commands.tables import aligned
 from baselines.commands.worlds import with_options
 from baselines.registry import make_controller
+from baselines.tables import aligned
 from birthsim_env.files import make_folder, whole_file, whole_results, write_json
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters

@@ -253,7 +253,7 @@ def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_contr
     lines = table([one, other]).splitlines()
     cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
     assert cells["metric"] == ["unit", "law: median", "95 %", "max", "mine: median", "95 %", "max"]
-    assert set(lines[1]) == {"|", "-"}
+    assert set(lines[1]) == {"|", "-", " "}
     assert len({line.count("|") for line in lines}) == 1
     assert cells["error_rms_x"] == ["mm", "2", f"{np.quantile([1, 2, 9.87654], 0.95):.3g}", "9.88", "0.5", "lost", "lost"]
     # Tails are of the size: -30 % is as bad as +30 %.
@@ -262,9 +262,6 @@ def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_contr
     assert cells["lost episodes"] == ["", "0 of 3", "", "", "1 of 3", "", ""]
     assert cells["successful episodes"][1] == "0 of 0"
     assert len(lines) == 2 + 2 + 3
-    means = table([one], "mean").splitlines()
-    assert means[0].split("|")[3].strip() == "law: mean"
-    assert means[2].split("|")[3].strip() == f"{np.mean([1, 2, 9.87654]):.3g}"
 
 
 def test_the_overview_says_which_episodes_were_never_settled_and_calls_the_lost_ones_lost():
@@ -272,4 +269,4 @@ def test_the_overview_says_which_episodes_were_never_settled_and_calls_the_lost_
     one.lost = [False, False, True]
     lines = overview([one]).splitlines()
     assert lines[1].split() == ["mine", "lost", "lost", "lost", "1", "of", "3"]
-    assert lines[2].strip() == "1 of 3 episodes were never settled and are left out above"
+    assert lines[2] == "mine: 1 of 3 episodes were never settled and are left out above"
