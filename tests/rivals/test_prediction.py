@@ -115,11 +115,6 @@ def test_symbols_are_the_second_model_too(rig: Parameters, algebra: str) -> None
         np.testing.assert_allclose(found[8:], seen_from_outside(now, rig), rtol=1e-7, atol=1e-9)
 
 
-def test_an_algebra_that_is_none_is_refused() -> None:
-    with pytest.raises(ValueError, match="algebra = 'maple'; allowed: 'sympy', 'casadi'"):
-        symbolic_model(algebra="maple")
-
-
 def about(rig: Parameters, steps: Array, weight: Array) -> Horizon:
     kept = np.exp(-steps / 2 / rig.valves.time_constant)
     return Horizon(Horizon.numbers(tick=np.zeros(NODES), step=steps, kept=kept, weight=weight, **TOLERANCES))
