@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.tracking import Integrals, TrackingController, beyond
 from birthsim_env.loop.signals import Measurement, Reference
@@ -74,10 +73,6 @@ def test_a_rival_stays_on_the_circle(rival: type[TrackingController], lab: bool,
     assert worst < 6e-3
 
 
-def test_without_control_the_end_effector_is_nowhere_near() -> None:
-    assert circle_error(lambda measured, wanted: np.zeros((4, 4)), Parameters(), False)[0] > 0.03
-
-
 @every_rival
 def test_a_rival_renders_the_stiffness(rival: type[TrackingController]) -> None:
     """LuGre friction, a rig 1 kg heavier than believed: pushed by 20 N, it gives way as asked, in any direction."""
@@ -93,9 +88,6 @@ def test_a_rival_renders_the_stiffness(rival: type[TrackingController]) -> None:
         for (kx, ky), kxy, f in zip(stiffness.T, reference.rows[14], push.T, strict=True)
     ]
     np.testing.assert_allclose(plant.end_effector()[:2] - reference.position, np.transpose(expected), atol=6e-4)
-
-
-# Memory
 
 
 def signals(lanes: int, calls: int, sampled: bool) -> list[tuple[Measurement, Reference]]:
@@ -171,8 +163,3 @@ def test_the_dead_zone_is_continuous() -> None:
     errors = np.linspace(-3, 3, 61)
     kept = np.array([beyond.py_func(error, 1.0) for error in errors])
     np.testing.assert_allclose(kept, np.sign(errors) * np.maximum(np.abs(errors) - 1, 0), atol=1e-15)
-
-
-def test_rivals_go_by_name() -> None:
-    for name, kind in zip(("pid", "lqr", "sliding-mode"), RIVALS, strict=True):
-        assert type(make_controller(name, Parameters(), friction_fraction=0.25)) is kind
