@@ -1,7 +1,5 @@
 """Nonlinear MPC: its quadratic programme against SciPy, what it knows, and what it achieves on the whole plant."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -26,19 +24,6 @@ RIG = Parameters()
 PERIOD = RIG.electronics.control_period
 FLOW = 1e-3
 """kg/s."""
-
-
-@cache
-def nth_controller(number: int) -> NonlinearMPC:
-    return NonlinearMPC(RIG)
-
-
-def controllers(count: int) -> list[NonlinearMPC]:
-    """As good as new, which takes less time than new ones."""
-    found = [nth_controller(number) for number in range(count)]
-    for controller in found:
-        controller.reset()
-    return found
 
 
 def constants(sensors: str = "ideal", rig: Parameters = RIG, **gains: float) -> Constants:
@@ -222,7 +207,7 @@ def test_short_pushes_through_friction(
     cases = [(0.5, 0.0, 20, 0, 2000, 2000, 0), (0.4, 0.05, 0, -15, 1500, 3000, 500), (0.62, -0.1, -8, 5, 3500, 3500, 0)]
     columns = np.array(cases).T.copy()
     own = StiffnessTest(columns[:2], columns[2:4], columns[4:], RIG)
-    answers = run_stiffness_test(own, controllers(1)[0], sensors, seed=3)
+    answers = run_stiffness_test(own, NonlinearMPC(RIG), sensors, seed=3)
     assert not answers.lost.any()
     assert np.abs(answers.stiffness_error(own.force)).max() < close
     assert answers.hunting.max() < still
@@ -260,7 +245,7 @@ def stiffness_of(plant: Plant) -> Array:
 
 def test_a_lane_without_numbers_is_left_alone() -> None:
     """Until it is reset no more flows than leaks through shut valves; the others notice nothing."""
-    record, (kept, blind) = recorded(3, 12, "ideal"), controllers(2)
+    record, kept, blind = recorded(3, 12, "ideal"), NonlinearMPC(RIG), NonlinearMPC(RIG)
     for tick, (measured, wanted) in enumerate(record):
         fields = {name: np.array(value) for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
         if tick in (3, 4):
@@ -283,7 +268,7 @@ def test_it_comes_back_from_an_end_stop() -> None:
     piston = np.array([[0.0, 0.0], [0.199, -0.199]])
     plant.state = balanced_state(plant.lane_parameters, piston, nothing, wanted.pneumatic_stiffness)
     plant.state[PRESSURES[2], 0] = plant.state[PRESSURES[3], 1] = 7e5
-    (law,) = controllers(1)
+    law = NonlinearMPC(RIG)
     for tick in range(700):
         openings = law.command(closed_loop.ideal(plant, tick * 1e-3, nothing), wanted)
         plant.advance_unchecked(openings, nothing[None], 1e-3)
