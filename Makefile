@@ -264,7 +264,6 @@ soak: $(READY)
 	$(BIN)/birthsim study soak --out $(OUT)/soak
 
 golden: $(READY)
-	$(BIN)/python -m tests.oracles.golden.make
 	$(BIN)/python -m tests.oracles.golden.fingerprints
 
 clean:

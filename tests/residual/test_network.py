@@ -73,17 +73,6 @@ def test_a_memory_is_pytorchs_gated_recurrent_unit(squashed):
     assert np.ptp(memories, axis=0).max() > 0.5
 
 
-@pytest.mark.parametrize("cells", [0, 32])
-def test_a_lane_has_the_same_bits_alone_and_among_many(cells):
-    made = network(INPUTS, 2, (32,), 3, cells=cells)
-    seen = observations(40, 67, INPUTS)
-    together = made.acting()
-    every = np.array([together(rows) for rows in seen])
-    for lane in (0, 1, 31, 66):
-        alone = made.acting()
-        np.testing.assert_array_equal(np.array([alone(rows[lane : lane + 1])[0] for rows in seen]), every[:, lane])
-
-
 def test_a_reset_forgets_the_lanes_that_it_names():
     made = network(INPUTS, 2, (8,), 4, cells=6)
     seen, lanes = observations(30, 5, INPUTS, scale=0.3), np.array([False, True, False, False, True])

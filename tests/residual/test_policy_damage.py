@@ -22,18 +22,12 @@ def folder(tmp_path):
 either = pytest.mark.parametrize("kind", POLICIES)
 
 
-def rewrite(folder, **changes):
-    """Change what is said about the arrays, and vouch for the result; None removes an entry."""
-    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
-    about = {name: value for name, value in {**about, **changes}.items() if value is not None}
-    (folder / WEIGHTS).write_bytes(sealed(arrays, about))
-
-
-def replace_arrays(folder, **changes):
-    """Change arrays (``_`` in a name stands for a dot; None removes one) and vouch for the result."""
-    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
-    arrays = {**arrays, **{name.replace("_", "."): value for name, value in changes.items()}}
-    (folder / WEIGHTS).write_bytes(sealed({name: value for name, value in arrays.items() if value is not None}, about))
+def rewrite(folder, arrays=None, about=None):
+    """Change arrays (``_`` in a name stands for a dot) and what is said about them, and vouch for the result; None removes."""
+    parts = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
+    changes = {name.replace("_", "."): value for name, value in (arrays or {}).items()}, about or {}
+    kept = [{**part, **new} for part, new in zip(parts, changes, strict=True)]
+    (folder / WEIGHTS).write_bytes(sealed(*({name: value for name, value in one.items() if value is not None} for one in kept)))
 
 
 def assert_refused(folder, message):
@@ -109,7 +103,7 @@ def test_another_format_is_called_foreign(folder, form):
     ],
 )
 def test_a_configuration_with_a_wrong_or_missing_entry_is_refused(folder, changes):
-    rewrite(folder, **changes)
+    rewrite(folder, about=changes)
     assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 
@@ -152,7 +146,7 @@ WRONG = {
 @pytest.mark.parametrize(("kind", "changes"), [(kind, changes) for kind, rows in WRONG.items() for changes in rows])
 def test_arrays_that_are_no_network_are_refused(folder, kind, changes):
     save_policy(POLICIES[kind], folder)
-    replace_arrays(folder, **changes)
+    rewrite(folder, changes)
     assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 

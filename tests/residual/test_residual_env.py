@@ -8,7 +8,7 @@ import birthsim_env
 from agents.residual import authority
 from agents.residual.env import ResidualEnv, ResidualVectorEnv
 from agents.residual.law import ResidualActuation, ResidualLaw
-from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
+from agents.residual.settings import IMPEDANCES, LAWS
 from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
 from birthsim_env import Parameters
@@ -255,15 +255,3 @@ def test_observations_tell_what_the_pistons_met_as_the_rigs_owner_describes_it(s
         observation = env.step(np.zeros((3, 2), np.float32))[0]
         np.testing.assert_array_equal(observation[:, -6:], np.clip(observer.met.T / 100, -10, 10).astype(np.float32))
     assert np.abs(observation[:, -6:]).max() > 0.05
-
-
-def test_the_largest_settings_are_allowed():
-    env = lanes(2, authority=500, time_constant=1, policy_period=1)
-    env.reset(seed=0)
-    assert np.isfinite(env.step(np.zeros((2, 2), np.float32))[0]).all()
-    settings = ResidualSettings("backstepping-weight", "variable", 500, 1, 1)
-    assert settings.to_dict() == {
-        "law": "backstepping-weight", "impedance": "variable", "authority": 500, "time_constant": 1, "policy_period": 1,
-        "force_sensor": True, "informed": False,
-    }  # fmt: skip
-    assert ResidualSettings(**settings.to_dict()) == settings

@@ -11,7 +11,7 @@ import yaml
 
 import agents
 from agents.residual.settings import ResidualSettings
-from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration, override
+from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 assert agents  # importing it registers the ids
@@ -69,12 +69,6 @@ def test_a_configuration_that_is_not_there_is_refused_with_those_that_are(name):
     with pytest.raises(ValueError, match=r"is no file.*; allowed: circle, .*vacuum.*, or a TOML file") as caught:
         load_configuration(name)
     assert repr(name or ".") in str(caught.value) or repr(name) in str(caught.value)
-
-
-def test_overriding_changes_what_is_named():
-    settings = override(TrainingSettings(), steps=9, algorithm="tqc")
-    assert (settings.steps, settings.algorithm) == (9, "tqc")
-    assert override(settings) == settings
 
 
 RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))

@@ -85,16 +85,6 @@ def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(tmp_path, 
         assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(reached["curve"]))
 
 
-@pytest.mark.usefixtures("brief")
-def test_one_that_dies_again_and_again_gets_there_as_well(tmp_path, monkeypatch):
-    expected = train(TINY, RESIDUAL, tmp_path / "whole")
-    for _ in range(3):
-        killed(monkeypatch, TINY, tmp_path / "cut", "_on_step", 40)
-    reached = train(TINY, RESIDUAL, tmp_path / "cut")
-    assert steady(reached["curve"]) == steady(expected["curve"])
-    assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize(("module", "name"), [(monitor, "save_checkpoint"), (reached, "save_policy")])

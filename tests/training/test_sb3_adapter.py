@@ -1,14 +1,17 @@
-"""Stable-Baselines3's view of a native vector environment: the same rollouts, and ends as its own wrappers report them."""
+"""Stable-Baselines3's view of a native vector environment: the same rollouts, ends as its own wrappers report them; and what
+wrappers of ours change: a learner's shifted rewards are the same problem, a privileged one sees the true figures."""
 
 import gymnasium
 import numpy as np
 import pytest
-import torch
-from stable_baselines3 import PPO
+from gymnasium import spaces
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv
 
+from agents.residual.privileged import FIGURES, true_figures
+from agents.training.privileged import Privileged
 from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.shifted_reward import ShiftedReward
 
 PROBE, RESIDUAL = "BirthSIM/Probe-v2", "BirthSIM/CircleResidual-v1"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)
@@ -28,10 +31,6 @@ def adapted(*args, **arguments) -> SB3VecEnv:
 def seeded(env, seed):
     env.seed(seed)
     return env.reset()
-
-
-def random_actions(steps, lanes=3, size=2, seed=0):
-    return np.random.default_rng(seed).uniform(-1, 1, (steps, lanes, size)).astype(np.float32)
 
 
 def test_rollouts_are_those_of_the_native_environment_through_several_episodes():
@@ -83,19 +82,6 @@ def test_ends_are_reported_as_by_stable_baselines_own_vectorization():
             np.testing.assert_array_equal(observation, expected)
         assert end[0]
         np.testing.assert_array_equal(seeded(env, 6), seeded(own, 6))
-
-
-def test_spaces_are_those_of_one_lane():
-    env, base = adapted(RESIDUAL, lanes=5), native(RESIDUAL, lanes=5)
-    assert env.num_envs == 5
-    assert env.observation_space == base.single_observation_space
-    assert env.action_space == base.single_action_space
-    observation = env.reset()
-    assert observation.shape == (5, 32)
-    assert observation.dtype == np.float32
-    _, rewards, dones, infos = env.step(np.zeros((5, 2), np.float32))
-    assert rewards.shape == dones.shape == (5,)
-    assert (rewards.dtype, dones.dtype, len(infos)) == (np.float32, np.bool_, 5)
 
 
 def test_a_seed_counts_for_one_reset_and_the_next_episode_differs():
@@ -178,16 +164,77 @@ def test_frames_come_from_the_lanes(monkeypatch):
     assert silent.get_images() == [None, None]
 
 
-def test_normalization_and_ppo_run_on_it():
-    torch.set_num_threads(1)  # two threads on small matrices mostly wait for each other
-    env = VecNormalize(adapted(lanes=4), gamma=0.9)
-    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
-    before = model.policy.action_net.weight.detach().clone()
-    model.learn(512)
-    assert model.num_timesteps == 512
-    assert env.venv.seconds > 0
-    assert not np.array_equal(before, model.policy.action_net.weight.detach())
-    # 128 steps of 4 lanes with at most 60 in an episode: at least two ends in each.
-    assert len(model.ep_info_buffer) >= 8
-    assert all(1 <= episode["l"] <= 60 for episode in model.ep_info_buffer)
-    assert np.isfinite([episode["r"] for episode in model.ep_info_buffer]).all()
+EPISODES = [([1.0, 0.5, 0.25], False), ([0.25], False), ([0.0] * 40, False), ([1.0, 0.75, 0.5], True)]
+"""Rewards, and whether the end is one of time, after which the last value goes on."""
+
+
+class Told(gymnasium.Env):
+    """Pays what it is told."""
+
+    observation_space = action_space = spaces.Box(-1, 1, (1,))
+
+    def __init__(self, rewards, truncated):
+        self.rewards, self.truncated, self.steps = rewards, truncated, 0
+
+    def reset(self, *, seed=None, options=None):
+        self.steps = 0
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):
+        self.steps += 1
+        ended = self.steps == len(self.rewards)
+        paid = self.rewards[self.steps - 1]
+        return np.zeros(1, np.float32), paid, ended and not self.truncated, ended and self.truncated, {}
+
+
+def told(rewards, truncated):
+    return DummyVecEnv([lambda: Told(rewards, truncated)])
+
+
+@pytest.mark.parametrize("discount", [0.9, 0.96, 0.999])
+@pytest.mark.parametrize(("rewards", "truncated"), EPISODES)
+def test_every_value_is_less_by_the_same(rewards, truncated, discount):
+    env = ShiftedReward(told(rewards, truncated), 0.5, discount)
+    env.reset()
+    paid = [float(env.step(np.zeros((1, 1)))[1][0]) for _ in rewards]
+    weights = discount ** np.arange(len(rewards))
+    less = 0.5 / (1 - discount)
+    # After an end of time a learner goes on with its own estimate, which is shifted as all values are.
+    beyond = -less * discount ** len(rewards) if truncated else 0.0
+    assert weights @ paid + beyond == pytest.approx(weights @ rewards - less, rel=1e-5)
+
+
+def test_survival_is_what_is_taken_off():
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, autoreset_mode="SameStep")
+    shifted = ShiftedReward(SB3VecEnv(env), 1.0, 0.96)
+    shifted.seed(0)
+    shifted.reset()
+    slam = np.tile(np.array([1, -1, 1, -1], np.float32), (3, 1))
+    ended = np.zeros(3, dtype=bool)
+    while not ended.any():
+        _, paid, ended, infos = shifted.step(slam)
+        assert (paid[~ended] <= 0).all()
+        assert (paid[~ended] > -1).all()
+    assert (paid[ended] < -24).all()
+    assert all(info["episode"]["r"] > 0 for info in infos if info)
+
+
+def test_every_observation_has_the_figures_of_its_own_episode():
+    lanes = gymnasium.make_vec(
+        "BirthSIM/ProbeResidual-v2", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
+    )  # fmt: skip
+    env = Privileged(SB3VecEnv(lanes, staggered=True))
+    env.seed(0)
+    seen, ends = env.reset(), 0
+    assert seen.shape == (4, *env.observation_space.shape)
+    for _ in range(12):
+        before = seen[:, -FIGURES:]
+        seen, _, ended, infos = env.step(np.zeros((4, 2), np.float32))
+        np.testing.assert_array_equal(seen[:, -FIGURES:], true_figures(lanes))
+        assert (seen[~ended, -FIGURES:] == before[~ended]).all()
+        for lane in np.flatnonzero(ended):
+            np.testing.assert_array_equal(infos[lane]["terminal_observation"][-FIGURES:], before[lane])
+            assert (seen[lane, -FIGURES:] != before[lane]).any()
+            ends += 1
+    assert ends >= 8
+    env.close()
