@@ -78,17 +78,25 @@ class Knot(Rows):
 
 
 @helper
+def knot_before(times: Array, i: int, count: int, now: float) -> int:
+    """The last of the ``count`` knots of lane ``i`` at or before ``now``, s, but not the very last; ``times`` (M, N), s."""
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle, i] <= now:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@helper
 def _interpolate(time: Array, knots: Array, counts: Array, force: Array, n: int) -> None:
     """``knots`` (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
     for i in range(n):
-        low, high = 0, int(counts[i]) - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if Knot(knots[middle]).time[i] <= time[i]:
-                low = middle
-            else:
-                high = middle
-        before, after = Knot(knots[low]), Knot(knots[high])
+        count = int(counts[i])
+        low = knot_before(knots[:, 0], i, count, time[i])
+        before, after = Knot(knots[low]), Knot(knots[min(low + 1, count - 1)])
         span = after.time[i] - before.time[i]
         part = max(0.0, min(1.0, (time[i] - before.time[i]) / span)) if span > 0.0 else 1.0
         for axis in range(2):
