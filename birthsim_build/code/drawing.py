@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from birthsim_env.loop.stage import scratch
+from birthsim_env.loop.stage import carray, pointer, scratch
 from birthsim_env.loop.world import Start
-from birthsim_env.parts.drawn.streams import POOL, States, bounded, fraction, next64, seed
-from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.parts.drawn.streams import POOL, States, Words, bounded, fraction, next64, seed
+from birthsim_env.physics.compiled.compilation import BLOCK, helper
 from birthsim_env.physics.compiled.lanes import Array
 
 WORDS, OUT = POOL + 2, 2 * POOL
@@ -13,10 +13,16 @@ WORDS, OUT = POOL + 2, 2 * POOL
 
 
 @helper
+def _words(room: Array, rows: int) -> Words:
+    """Room for numbers as room for words of 32 bits, (rows, BLOCK)."""
+    return carray(pointer(np.int64(room.ctypes.data), np.uint32), (rows, BLOCK))
+
+
+@helper
 def seeded(own: Start, stream: int, state: States, n: int) -> None:
     """Begin the stream of this number in ``STREAMS``."""
-    numbers, words = own.rows.view(np.uint64), scratch(WORDS).view(np.uint32)
-    pool, out = scratch(POOL).view(np.uint32), scratch(OUT).view(np.uint32)
+    numbers, words = own.rows.view(np.uint64), _words(scratch(WORDS), WORDS)
+    pool, out = _words(scratch(POOL), POOL), _words(scratch(OUT), OUT)
     for i in range(n):
         words[0, i], words[1, i] = numbers[0, i] & np.uint64(0xFFFFFFFF), numbers[0, i] >> np.uint64(32)
         words[2, i], words[3, i] = np.uint32(0), np.uint32(0)

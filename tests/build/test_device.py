@@ -75,9 +75,7 @@ def assert_same_run(here, there, steps, **options):
 @pytest.mark.slow
 @pytest.mark.parametrize(("mode", "staggered"), [("NextStep", False), ("NextStep", True), ("SameStep", True)])
 @pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v1", "honest"), (RESIDUAL, "lab")])
-def test_the_bits_of_the_native_environment(monkeypatch, mode, staggered, name, sensors):
-    # Lanes begin in groups of this size, the last of them smaller.
-    monkeypatch.setattr(episodes, "TOGETHER", 3)
+def test_the_bits_of_the_native_environment(mode, staggered, name, sensors):
     shared = {"sensors": sensors, "autoreset_mode": mode, "max_episode_steps": 4}
     assert_same_run(made(None, name, **shared), made("host", name, **shared), 11, staggered=staggered)
 

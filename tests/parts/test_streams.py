@@ -13,7 +13,6 @@ from birthsim_env.parts import courses
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.drawn.streams import TOGETHER, Streams, begin, worlds
-from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
@@ -177,7 +176,7 @@ def test_a_users_own_begin_is_called_lane_by_lane_with_numpys_generator():
         assert own._own[2, lane] == radius + rng.normal()
 
 
-@pytest.mark.parametrize("base", [ForceProfile, Ramp, Contractions])
+@pytest.mark.parametrize("base", [ForceProfile, Ramp])
 def test_a_users_own_knots_are_drawn_lane_by_lane(base):
     class Own(base):
         def knots(self, rng):

@@ -14,7 +14,7 @@ from birthsim_env.loop.stage import Stage, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.plant import checked
@@ -93,20 +93,28 @@ class Knot(Rows):
     force = rows("x y", "N", "of the hand")
 
 
+@helper
+def knot_before(times: Array, i: int, count: int, now: float) -> int:
+    """The last of the ``count`` knots of lane ``i`` at or before ``now``, s, but not the very last; ``times`` (M, N), s."""
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle, i] <= now:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
 @kernel
 def _interpolate(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """Knots (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
     knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
     time, force = seen.time, world.force
     for i in range(n):
-        low, high = 0, int(counts[i]) - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if Knot(knots[middle]).time[i] <= time[i]:
-                low = middle
-            else:
-                high = middle
-        before, after = Knot(knots[low]), Knot(knots[high])
+        count = int(counts[i])
+        low = knot_before(knots[:, 0], i, count, time[i])
+        before, after = Knot(knots[low]), Knot(knots[min(low + 1, count - 1)])
         span = after.time[i] - before.time[i]
         part = max(0.0, min(1.0, (time[i] - before.time[i]) / span)) if span > 0.0 else 1.0
         for axis in range(2):

@@ -51,7 +51,7 @@ _NUMPY = {"max": "maximum", "min": "minimum", "sqrt": "sqrt"}
 
 _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul, np.divide: operator.truediv,
-    np.negative: operator.neg, np.less: operator.lt, np.greater: operator.gt, np.equal: operator.eq,
+    np.less: operator.lt, np.greater: operator.gt,
     **{getattr(np, own): _of_graph(name) for name, own in _NUMPY.items()},
 }  # fmt: skip
 """NumPy's operations, of one entry."""
@@ -68,13 +68,8 @@ class Unknown(Symbols):
 
     def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> Any:
         if function is np.where:
-            return _chosen(*arguments)
-        if function is np.select:
-            *others, last = zip(*arguments, strict=True)
-            found = last[1]
-            for condition, value in reversed(others):
-                found = _chosen(condition, value, found)
-            return found
+            bare = [np.asarray(one, dtype=object).view(np.ndarray) for one in arguments]
+            return np.asarray(np.frompyfunc(_either, 3, 1)(*bare), dtype=object).view(Unknown)
         return super().__array_function__(function, types, arguments, options)
 
     def trace_kernel(self, kernel: Any, *arguments: Any) -> None:
@@ -82,12 +77,6 @@ class Unknown(Symbols):
         from birthsim_env.physics.gradients.tracing import rewritten  # late: that module is made of this one
 
         rewritten(kernel.py_func)(*arguments)
-
-
-def _chosen(*entries: Any) -> Any:
-    """``where`` of a condition, entry by entry."""
-    bare = [np.asarray(one, dtype=object).view(np.ndarray) for one in entries]
-    return np.asarray(np.frompyfunc(_either, 3, 1)(*bare), dtype=object).view(Unknown)
 
 
 def _either(condition: Any, yes: Any, no: Any) -> Any:
