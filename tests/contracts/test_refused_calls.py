@@ -9,7 +9,6 @@ import pytest
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
-from baselines.backstepping.lyapunov import LyapunovFunction
 from baselines.identification.experiment import propose
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
@@ -20,6 +19,7 @@ from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from studies.labour.model import Labour
+from studies.lyapunov import LyapunovFunction
 from studies.verification.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
