@@ -1,11 +1,16 @@
 """What is built computes the bits of Python: closed loops, laws alone and the plant alone; for other processors under qemu."""
 
+import json
 from functools import cache
 
+import numpy as np
 import pytest
 
-from birthsim_build.bundle import identifier
+from birthsim_build.building import build_c
+from birthsim_build.bundle import Bundle, identifier
 from birthsim_build.code.targets import HOST
+from birthsim_build.loops import plant_world
+from birthsim_env import Parameters, Plant
 from studies.targets import reference
 from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
 from studies.targets.running import EMULATED, ROW, emulated_rows, library_rows, node_rows
@@ -86,3 +91,28 @@ def test_a_law_on_cortex_m7(tmp_path, sensors):
     seen, openings = law_openings(LAW, sensors)
     rows = emulated_rows("cortex-m7", tmp_path, f"law_{identifier(LAW)}_{KINDS[sensors]}", PERIODS, seen)
     assert_same_bits(rows[:, OPENINGS], openings)
+
+
+OPTIONS = {
+    "worn": {"valves.deadband": 0.02, "valves.hysteresis": 0.01},
+    "all": {
+        "air.supply_conductance": 6e-9, "air.supply_volume": 2e-3, "chambers.tube_length": 1, "mechanics.mode_frequency": 30,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_the_plant_with_options(tmp_path, options):
+    """Worn valves, tubes, a supply that droops and a structure that bends."""
+    need_linker()
+    if HOST is None:
+        pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")
+    rig, periods = Parameters().replace(options), 500
+    (tmp_path / "build.json").write_text(json.dumps(build_c(Bundle(rig, {}, {}, plant_world(rig)), HOST, tmp_path)))
+    inputs, _ = plant_states(periods)
+    plant, states = Plant(rig), np.empty((periods, 18))
+    given = np.array([inputs[name] for name in (*(f"opening_{chamber}" for chamber in CHAMBERS), "force_x", "force_y")])
+    for k, state in enumerate(states):
+        state[:] = plant.advance(given[:4, [k]], given[4:, [k]], 0.001)[:, 0]
+    assert_same_bits(library_rows(tmp_path, "plant", periods, inputs)[:, ROW["y1"] : ROW["y1"] + 18], states)

@@ -24,10 +24,10 @@ from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import load_parameters
 from tests.build.targets import build, imported, need_linker
+from tests.console import ROOT
 
 fmpy, validate_fmu = imported("fmpy"), imported("fmpy.validation").validate_fmu
 
-ROOT = Path(__file__).parent.parent.parent
 RIG, PERIOD = Parameters(), 1e-3
 OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
 CIRCLE = "BirthSIM/Circle-v1"

@@ -14,7 +14,7 @@ from birthsim_build.device.export import write_programs
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import controlled, pieces_of
 from birthsim_build.device.machine import Host
-from birthsim_build.device.program import key_of, program_of
+from birthsim_build.device.program import key_of
 from birthsim_build.layout import LAYOUT
 from birthsim_env import Parameters
 from birthsim_env.assembly import assemble
@@ -52,37 +52,6 @@ def differing(pieces, made):
     """Numbers of the arrays that differ in a bit."""
     pairs = enumerate(zip(made.views, pieces.arrays(), strict=True))
     return [k for k, (view, array) in pairs if view is not None and view.tobytes() != array.tobytes()]
-
-
-def test_a_program_fills_its_lanes_and_finds_its_tables():
-    many, other = begun(5, sensors="lab"), begun(2, sensors="lab")
-    pieces = pieces_of(many.simulation)
-    program = program_of(pieces, pieces_of(other.simulation), pieces.functions)
-    lanes, words = 7, program.words.copy()
-    data = np.full((program.rows, lanes), -1)
-    place = words.ctypes.data, 0, data.ctypes.data, lanes
-    assert threads.place(*place) == 0
-    # What is placed may be placed anew.
-    before = words.copy()
-    threads.place(*place)
-    np.testing.assert_array_equal(words, before)
-    for lane in range(lanes + 1):
-        threads.fill(words.ctypes.data, lane, 0, 0)
-    views = [region and region.of(data, lanes) for region in program.regions]
-    for view, region, array in zip(views, program.regions, pieces.arrays(), strict=True):
-        if region is not None:
-            for lane in range(lanes):
-                np.testing.assert_array_equal(view[region.at(lane)], array[region.at(0)])
-    addresses = {key_of(array): view for view, array in zip(views, pieces.arrays(), strict=True)}
-    first = threads.HEAD + threads.MOVE * words[threads.MOVES]
-    tables = 0
-    for k, stage in enumerate(pieces.every):
-        described = (words[first + threads.STAGE * k + 5] - words.ctypes.data) // 8
-        for t, table in enumerate(stage.tables):
-            address, *shape = words[described + 5 * t : described + 5 * t + 1 + table.ndim]
-            assert (address, tuple(shape)) == (addresses[key_of(table)].ctypes.data, addresses[key_of(table)].shape)
-            tables += 1
-    assert tables > 5
 
 
 EXACT = re.compile(

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.electronics import Electronics
+from tests.console import ROOT
 
 LAB = ("position_noise", "position_latency", "pressure_noise")
 OFF = {name: 0.0 for name in FIGURES if name not in (*LAB, "distortion_length")}
@@ -244,7 +244,7 @@ def test_ranges_are_drawn_for_every_episode_and_the_latest_arrives():
 
 
 def test_the_page_has_every_figure_with_its_default_and_its_range():
-    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "environments.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*)$", page, re.MULTILINE))
     for field_ in dataclasses.fields(Electronics):
         if field_.name != "control_period":

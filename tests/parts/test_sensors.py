@@ -54,6 +54,7 @@ def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sampl
     seen = lab(electronics, swing, round(0.6 / period))
     time = period * np.arange(len(seen["position"]))
     taken = seen["position_time"][:, 0]
+    assert taken[0] == 0.0, "the first sample is there from the start"
     assert np.all(np.diff(taken) >= 0)
     settled = time >= latency + 1 / rate + period
     assert np.all(taken[time >= latency] <= time[time >= latency] - latency + 1e-9)
@@ -61,12 +62,6 @@ def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sampl
     # Without noise a sample is where the end effector was when it was taken.
     np.testing.assert_allclose(seen["position"][:, :, 0], [swing(t)[:2] for t in taken], atol=1e-12)
     assert len(np.unique(taken)) >= 0.9 * min(rate, 1 / period) * (0.6 - latency) - 2
-
-
-def test_the_first_sample_is_there_from_the_start():
-    seen = lab(board(position_noise=0.0), lambda t: (0.5 + t, 0.0, 1.0, 0.0), 8)
-    np.testing.assert_array_equal(seen["position_time"][:, 0], 0.0)
-    np.testing.assert_array_equal(seen["position"][:, 0, 0], 0.5)
 
 
 def test_the_shown_velocity_is_a_slow_difference_that_finds_a_constant_speed():
