@@ -139,18 +139,6 @@ def test_a_vector_environment_that_resets_one_step_later_is_refused(mode):
     env.close()
 
 
-def test_one_that_resets_within_the_step_is_taken_whoever_made_it():
-    mode = {"autoreset_mode": gymnasium.vector.AutoresetMode.SAME_STEP}
-    env = SB3VecEnv(gymnasium.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync", vector_kwargs=mode))
-    seeded(env, 0)
-    lengths = []
-    for _ in range(60):
-        infos = env.step(np.array([0, 1]))[3]
-        lengths += [info["episode"]["l"] for info in infos if info]
-    assert lengths
-    assert max(lengths) < 15
-
-
 def test_frames_come_from_the_lanes(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     env = adapted(RESIDUAL, lanes=2, render_mode="rgb_array")
@@ -202,21 +190,6 @@ def test_every_value_is_less_by_the_same(rewards, truncated, discount):
     # After an end of time a learner goes on with its own estimate, which is shifted as all values are.
     beyond = -less * discount ** len(rewards) if truncated else 0.0
     assert weights @ paid + beyond == pytest.approx(weights @ rewards - less, rel=1e-5)
-
-
-def test_survival_is_what_is_taken_off():
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, autoreset_mode="SameStep")
-    shifted = ShiftedReward(SB3VecEnv(env), 1.0, 0.96)
-    shifted.seed(0)
-    shifted.reset()
-    slam = np.tile(np.array([1, -1, 1, -1], np.float32), (3, 1))
-    ended = np.zeros(3, dtype=bool)
-    while not ended.any():
-        _, paid, ended, infos = shifted.step(slam)
-        assert (paid[~ended] <= 0).all()
-        assert (paid[~ended] > -1).all()
-    assert (paid[ended] < -24).all()
-    assert all(info["episode"]["r"] > 0 for info in infos if info)
 
 
 def test_every_observation_has_the_figures_of_its_own_episode():
