@@ -1,4 +1,4 @@
-"""Configurations of trainings: those that come with the package, one's own, and what is unknown or impossible by name."""
+"""Configurations of trainings: those that come with the package, one's own, and ranges that reach further in training."""
 
 import json
 import tomllib
@@ -12,7 +12,10 @@ import yaml
 import agents
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration
+from agents.training.margin import widened
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.physics.rig.parameters import Parameters
 
 assert agents  # importing it registers the ids
 
@@ -94,3 +97,21 @@ def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
         assert zoo["env_kwargs"].get(key, getattr(ResidualSettings(), key)) == value
     env = gymnasium.make(training.environment, **zoo["env_kwargs"])
     assert env.action_space.shape == (residual.size,)
+
+
+MASSES, SLOWEST = (2.0, 5.0), 0.008
+"""kg; s: what ``Mechanics.mass`` and ``Valves.time_constant`` document."""
+
+
+def test_ranges_reach_further_on_one_side() -> None:
+    known, wide = documented_ranges(Parameters()), documented_ranges(widened(Parameters(), 0.5))
+    assert wide["mechanics.mass"] == pytest.approx((MASSES[0] / 1.5, MASSES[1]))
+    assert wide["valves.time_constant"] == pytest.approx((0.0015, 1.5 * SLOWEST))
+    assert {name for name in known if wide[name] == known[name]} == {"chambers.dead_volume", "chambers.wall_heat_transfer"}
+
+
+def test_an_owners_own_ranges_count() -> None:
+    rig = Parameters.from_dict({"randomize": {"mechanics.mass": [7.0, 10.0], "air.supply_pressure": [6e5, 7e5]}})
+    ranges = documented_ranges(widened(rig, 0.25))
+    assert ranges["mechanics.mass"] == (7.0 / 1.25, 10.0)
+    assert ranges["air.supply_pressure"] == (6e5, 7e5)

@@ -18,6 +18,7 @@ from agents.training import monitor, validation
 from agents.training import reached as reached_module
 from agents.training import trainer as training
 from agents.training.configuration import TrainingSettings
+from agents.training.margin import widened
 from agents.training.trainer import train
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController
@@ -133,13 +134,14 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     rig = Parameters().replace({"mechanics.mass": 4.0})
     residual = ResidualSettings("backstepping-weight", "variable_kp", 22.0, 0.05, 0.02)
     brief = replace(BRIEF, seed=30, lanes=4, steps=256, batch=64)
-    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant")
+    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant", margin=0.25)
     train(settings, residual, tmp_path, rig)
-    expected = {"sensors": "lab", "randomize": "plant", "parameters": rig, **residual.to_dict()}
+    expected = {"sensors": "lab", "randomize": "plant", **residual.to_dict()}
     expected["autoreset_mode"] = gymnasium.vector.AutoresetMode.SAME_STEP
-    for (name, arguments, _), lanes in zip(made, (4, 4), strict=True):
+    # Only training meets the margin.
+    for (name, arguments, _), own in zip(made, (widened(rig, 0.25), rig), strict=True):
         assert name == "BirthSIM/ForcepsResidual-v1"
-        assert arguments == {**expected, "num_envs": lanes}
+        assert arguments == {**expected, "parameters": own, "num_envs": 4}
     # Seed 30 starts from worlds of its own; all validations take the same ones, which training never meets.
     (_, _, trains), (_, _, checks) = made
     assert [seed for seed in trains if seed is not None] == [[2_300_000 + lane for lane in range(4)]]
