@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -72,25 +71,6 @@ def test_jacobian_and_joint_forces_are_those_of_points(rig: Parameters) -> None:
     force = np.random.default_rng(3).uniform(-200, 200, piston.shape)
     expected = np.einsum("ijkl,ikl->jkl", found, force)
     np.testing.assert_allclose(geometry.joint_force(force, piston, rig), expected, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("point", "why"),
-    [
-        ((0.700001, 0.0), "a micrometre beyond the stroke of cylinder 2"),
-        ((0.25, 0.0), "nearer than the shortest cylinder 2"),
-        ((0.3, 0.4), "above the shortest cylinder 1"),
-        ((-0.5, 0.0), "linkage folded over"),
-        ((0.0, 0.0), "the pivot"),
-        ((math.nan, 0.0), "no number"),
-    ],
-)
-def test_unreachable_point_is_named_with_the_workspace(point: tuple[float, float], why: str) -> None:
-    reachable = (0.5, 0.01)
-    with pytest.raises(ValueError, match="unreachable") as error:
-        geometry.inverse_geometry(np.transpose([reachable, point, reachable]), Parameters())
-    assert f"position = ({point[0]:.6g}, {point[1]:.6g}) m" in str(error.value), why
-    assert "0.3 to 0.7 m" in str(error.value), why
 
 
 def test_edges_of_the_workspace_are_named_rightly_and_reached() -> None:

@@ -1,7 +1,5 @@
 """Servovalves: ISO 6358 flows, the spool's lag and the exact inverses of the characteristic, through the plant itself."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,27 +9,17 @@ from birthsim_env.physics import valves
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, TEMPERATURES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.accuracy import second_model
 
 C, B, CL = 3.9e-9, 0.30, 0.005 * 3.9e-9
 RHO0, T0, SUPPLY, ATMOSPHERE = 1.185, 293.15, 7.0e5, 1.013e5
 """Assumed: sonic conductance, critical ratio, leakage; ISO 6358 reference state; absolute pressures."""
 
 
-def iso_6358(conductance: float, p_up: float, t_up: float, p_down: float) -> float:
-    """Mass flow, kg/s, from the higher pressure to the lower, written from ISO 6358-1:2013 with its laminar end."""
-    ratio = p_down / p_up
-    if ratio <= B:
-        psi = 1.0
-    elif ratio <= 0.99:
-        psi = math.sqrt(1 - ((ratio - B) / (1 - B)) ** 2)
-    else:
-        psi = 100 * (1 - ratio) * math.sqrt(1 - ((0.99 - B) / (1 - B)) ** 2)
-    return conductance * RHO0 * p_up * math.sqrt(T0 / t_up) * psi
-
-
 def both_ways(conductance: float, pa: float, ta: float, pb: float, tb: float) -> float:
-    """Mass flow from a to b, negative when it runs the other way with upstream and downstream exchanged."""
-    return iso_6358(conductance, pa, ta, pb) if pa > pb else -iso_6358(conductance, pb, tb, pa)
+    """ISO 6358 mass flow from a to b, kg/s, by the second model; negative when it runs the other way."""
+    (up, warm, down), sign = ((pa, ta, pb), 1) if pa > pb else ((pb, tb, pa), -1)
+    return sign * float(second_model.orifice(conductance, up, warm, down, B, RHO0, T0))
 
 
 def plant_flows(pressure: Array, temperature: Array, spool: Array, changes: dict[str, float] | None = None) -> Array:

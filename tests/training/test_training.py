@@ -18,12 +18,13 @@ from agents.training import monitor, validation
 from agents.training import reached as reached_module
 from agents.training import trainer as training
 from agents.training.configuration import TrainingSettings
+from agents.training.margin import widened
 from agents.training.trainer import train
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
-from tests.training.brief import steady, zero
+from tests.training.brief import steady
 
 PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
@@ -81,19 +82,6 @@ def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tm
     assert len(networks) == 5
 
 
-def test_the_folder_holds_the_policy_whose_figures_were_reported(trained):
-    folder, reached = trained
-    policy = load_policy(folder)
-    assert (policy.environment, policy.settings, policy.network.squashed) == (PROBE, RESIDUAL, False)
-    assert {name: policy.training[name] for name in SMALL.to_dict()} == SMALL.to_dict()
-    assert steady([policy.training["law"], policy.training["reached"]]) == steady([reached["law"], reached["policy"]])
-    env = gymnasium.make_vec(policy.environment, num_envs=SMALL.validation_lanes, randomize=True, duration=4.5)
-    assert steady([validate(env, policy.network.acting()).to_dict()]) == steady([reached["policy"]])
-    # On worlds that neither training nor validation has seen it is better as well.
-    unseen = gymnasium.make_vec(policy.environment, num_envs=32, randomize=True, duration=4.5)
-    assert validate(unseen, policy.network.acting(), 50_000).pooled < 0.9 * validate(unseen, zero, 50_000).pooled
-
-
 @pytest.fixture
 def events(trained):
     """What TensorBoard shows of the small training: tag -> {step: value}."""
@@ -146,13 +134,14 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     rig = Parameters().replace({"mechanics.mass": 4.0})
     residual = ResidualSettings("backstepping-weight", "variable_kp", 22.0, 0.05, 0.02)
     brief = replace(BRIEF, seed=30, lanes=4, steps=256, batch=64)
-    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant")
+    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant", margin=0.25)
     train(settings, residual, tmp_path, rig)
-    expected = {"sensors": "lab", "randomize": "plant", "parameters": rig, **residual.to_dict()}
+    expected = {"sensors": "lab", "randomize": "plant", **residual.to_dict()}
     expected["autoreset_mode"] = gymnasium.vector.AutoresetMode.SAME_STEP
-    for (name, arguments, _), lanes in zip(made, (4, 4), strict=True):
+    # Only training meets the margin.
+    for (name, arguments, _), own in zip(made, (widened(rig, 0.25), rig), strict=True):
         assert name == "BirthSIM/ForcepsResidual-v1"
-        assert arguments == {**expected, "num_envs": lanes}
+        assert arguments == {**expected, "parameters": own, "num_envs": 4}
     # Seed 30 starts from worlds of its own; all validations take the same ones, which training never meets.
     (_, _, trains), (_, _, checks) = made
     assert [seed for seed in trains if seed is not None] == [[2_300_000 + lane for lane in range(4)]]
