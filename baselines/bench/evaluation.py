@@ -17,11 +17,13 @@ from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller, Law, controller_of
-from baselines.staged import driving
+from baselines.staged import Driving, driving
 from baselines.tables import aligned, markdown
 from birthsim_env.assembly import Arguments, spelled_out
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.values import shown
+from birthsim_env.simulation import Simulation
 
 LANES = 256
 """Episodes that run side by side."""
@@ -30,7 +32,7 @@ AT_ONCE = 250
 """Control periods between two looks at what is lost, where nothing stops the loop."""
 
 TIMED = 10
-"""Calls of a controller, at least, over which its time is taken; a compiled one is called when its episodes are over."""
+"""Calls of a controller, at least, over which its time is taken."""
 
 
 @dataclass
@@ -94,6 +96,9 @@ def evaluate_worlds(
     **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
+    if arguments.get("device") is not None:  # type: ignore[typeddict-item]
+        said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
+        raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]
     result, law, first = Evaluation(name), controller_of(controller), 0
     spent: list[float] = []
     try:
@@ -149,9 +154,7 @@ def _run_batch(
             break
         bar.update(steps)
     bar.close()
-    while len(driver.spent) < TIMED:
-        driver.openings(simulation.plant, simulation.measurement, simulation.reference)
-    spent += driver.spent
+    spent += times_of(driver, simulation)
     env.close()
     for name, values in figures_of(own, period).items():
         result.metrics[name] += values.tolist()
@@ -162,6 +165,13 @@ def _run_batch(
     for discount, sums in zip(DISCOUNTS, own.returns, strict=True):
         result.returns[discount] += sums.tolist()
     result.traces.append(measures.error.transpose(0, 2, 1))
+
+
+def times_of(driver: Driving, simulation: Simulation) -> list[float]:
+    """What calls of a controller took, us per lane, ``TIMED`` at least: one that was compiled into a loop is called now."""
+    while len(driver.spent) < TIMED:
+        driver.openings(simulation.plant, simulation.measurement, simulation.reference)
+    return driver.spent
 
 
 def overview(evaluations: list[Evaluation]) -> str:

@@ -32,7 +32,7 @@ A stage: number of its function, when it runs, 1 if it sees the world, the first
 addresses of its constants and of what describes its tables. A fill: first row of an array in the data, its numbers of 32 bits
 before and behind its lanes, and the word at which those of a lane that begins are. A relocation: see ``place``."""
 
-PERIOD, CLOSES, BEGINS = range(3)
+TIMES = PERIOD, CLOSES, BEGINS = range(3)
 """When a stage runs: in every control period, at the end of a policy step, where an episode begins."""
 
 IN_PROGRAM, IN_DATA, COUNT = range(3)
@@ -167,7 +167,8 @@ def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str
     wrappers = "\n".join(wrapper(k, symbol, "i64 %lane") for k, symbol in enumerate(symbols))
     stages, own = len(symbols) - len(threads.adjoints), (RUNS[-1], threads.space)
     rooms = {RUNS[-1]: own, BEGIN: own, BACK: (BACK, threads.back_space)}
-    entries = "".join(_entry(name, symbol, *rooms.get(name, ("", 0))) for name, symbol in zip(threads.runs, kernels, strict=True))
+    pairs = zip(threads.runs, kernels, strict=True)
+    entries = "".join(_entry(name, symbol, *rooms.get(name, ("", 0))) for name, symbol in pairs)
     return f"""
 {wrappers}
 {_dispatch(RUNS[-1], range(stages))}

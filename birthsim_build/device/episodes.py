@@ -19,6 +19,7 @@ from birthsim_env.loop.world import Start
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 
+
 class DeviceEpisodes(Episodes):
     """``lanes`` lanes on a ``device``, where they begin and advance; ``assembled`` gives the setup for a number of lanes.
 

@@ -13,6 +13,7 @@ from birthsim_env.files import write_json
 from birthsim_env.loop.rows import WORLD
 from birthsim_env.physics.rig.parameters import Parameters
 
+
 def write_programs(
     loops: Iterable[tuple[str, str, str]], rig: Parameters, seed: int, folder: Path
 ) -> tuple[list[str], int, dict[str, int]]:

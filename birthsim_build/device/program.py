@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_build.code.tape import ABOUT, CLOSING, LIVE, OPEN
-from birthsim_build.code.threads import (
-    BEGINS, CLOSES, COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, PERIOD, RELOCATION, STAGE, Threads,
-)  # fmt: skip
+from birthsim_build.code.threads import COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, RELOCATION, STAGE, TIMES, Threads
 from birthsim_build.image import Words, function_name
 from birthsim_env.loop.gradients.taped import TapedLoop
 from birthsim_env.loop.loop import Place
@@ -203,14 +201,15 @@ def program_of(many: Pieces, other: Pieces, functions: Sequence[str], taped: Tap
     of_lanes = sum(key_of(table) in regions for table in tables)
     counts = (len(moves), len(many.every), len(arrays), len(moves) + 2 * len(many.every) + len(tables) + of_lanes)
     writer = _Writer(HEAD + sum(count * words for count, words in zip(counts, (MOVE, STAGE, FILL, RELOCATION), strict=True)))
+    groups = (many.stages, many.closing, many.beginning)
+    times = [time for time, group in zip(TIMES, groups, strict=True) for _ in group]
     moved, staged, fills = [], [], []
     for k, (array, row) in enumerate(moves):
         writer.refer(HEAD + MOVE * k, IN_DATA, regions[key_of(array)].first)
         moved.append((0, len(array), row, int(array.flags.writeable)))
     for k, stage in enumerate(many.every):
         memory = space if stage.memory is None else memories[id(stage.memory)]
-        when = BEGINS if k >= len(many.stages) + len(many.closing) else CLOSES if k >= len(many.stages) else PERIOD
-        staged.append((functions.index(function_name(stage)), when, int(stage.sees_world), memory, 0, 0))
+        staged.append((functions.index(function_name(stage)), times[k], int(stage.sees_world), memory, 0, 0))
         constants = HEAD + MOVE * len(moves) + STAGE * k + 4
         writer.refer(constants, IN_PROGRAM, writer.put(stage.constants))
         writer.refer(constants + 1, IN_PROGRAM, writer.tables(stage, regions))

@@ -103,7 +103,7 @@ def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
     assert str(PROBE) == "Probe, ideal sensors, nominal rig"
     drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]
     assert {one.sensors for one in drawn} == {"honest"}, "the only ones whose figures can be drawn"
-    assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal rig"
+    assert str(drawn[0]) == "Circle, honest sensors, figures randomised, nominal rig"
 
 
 def test_settings_tell_a_file_from_its_next_version_and_controllers_have_files_of_their_own(tmp_path):
@@ -245,7 +245,9 @@ def test_lost_episodes_are_counted_by_environment(figures):
 def test_the_data_file_has_a_row_per_condition_metric_and_controller(figures):
     table = list(csv.DictReader(data(figures).splitlines()))
     assert {row["environment"] for row in table} == {CIRCLE.environment, PROBE.environment}
-    assert {(row["rig"], row["hand"]) for row in table if row["environment"] == CIRCLE.environment} == {("drawn", OWN_HAND)}
+    assert {(row["rig"], row["hand"]) for row in table if row["environment"] == CIRCLE.environment} == {
+        ("randomised", OWN_HAND)
+    }
     found = {(row["metric"], row["controller"]): row for row in table if row["environment"] == CIRCLE.environment}
     other = found["settled_rms", "other"]
     assert (other["unit"], other["median"], other["q95"], other["worst"]) == ("mm", "2", "lost", "lost")

@@ -14,7 +14,7 @@ import pytest
 from baselines.bench.evaluation import evaluate
 from baselines.controller import PlainLaw
 from baselines.registry import make_controller
-from birthsim_build.device import episodes, machine
+from birthsim_build.device import machine
 from birthsim_build.device.evaluation import evaluate_on
 from birthsim_env import ForceProfile, Parameters, StiffnessSchedule
 from birthsim_env.parts.references import Trajectory
@@ -93,20 +93,6 @@ def test_lanes_that_wait_begin_where_they_are_told():
     assert_equal(np.delete(outcomes[0][0], 2, axis=0), np.delete(outcomes[1][0], 2, axis=0))  # lane 2 drew its own seed
 
 
-class Taps(ForceProfile):
-    """A user's hand that is compiled, with a number of knots of its own in every episode."""
-
-    def knots(self, rng):
-        return [(0.0, 0.0, 0.0), *((0.01 * k, rng.uniform(-20, 20), 0.0) for k in range(1, rng.integers(2, 30)))]
-
-
-@pytest.mark.slow
-def test_a_table_gets_room_for_more(monkeypatch):
-    monkeypatch.setattr(episodes, "TOGETHER", 2)
-    shared = {"user_force": Taps(), "max_episode_steps": 3}
-    assert_same_run(made(None, **shared), made("host", **shared), 13)
-
-
 @pytest.mark.slow
 def test_two_devices_are_one():
     whole, parts = made("host", lanes=7), [made("host", lanes=n) for n in (3, 4)]
@@ -180,11 +166,12 @@ def law(name="admittance-backstepping"):
 def test_an_evaluation_measures_the_same(lanes, world):
     shared = {"sensors": "lab", "randomize": True, "duration": 0.6, **world}
     here = evaluate(CIRCLE, law(), "law", lanes, SEED, False, **copy.deepcopy(shared))
-    there = evaluate_on("host", CIRCLE, law(), "law", lanes, SEED, **copy.deepcopy(shared))
+    there = evaluate_on("host", CIRCLE, law(), "law", lanes, SEED, False, **copy.deepcopy(shared))
     # JSON writes every bit of a number, and NaN as NaN.
     assert json.dumps(here.to_dict()) == json.dumps(there.to_dict())
     assert_equal(np.concatenate(here.traces, axis=1), np.concatenate(there.traces, axis=1))
     assert bool(world) == (0 < sum(here.lost) < lanes)
+    assert 0.0 < there.cost < 1e6
 
 
 class Still(Trajectory):
@@ -201,6 +188,8 @@ def test_what_no_device_does_is_refused_by_name(monkeypatch):
         made("host", reference=Still())
     with pytest.raises(ValueError, match=r"controller = Asleep, in Python; allowed on a device: what is compiled"):
         evaluate_on("host", CIRCLE, Asleep(lambda measurement, reference: 0.0), "asleep", 2, SEED)
+    with pytest.raises(ValueError, match=r"device = 'cuda'; allowed: None; birthsim_build\.device\.evaluation\.evaluate_on"):
+        evaluate(CIRCLE, law(), "law", 2, SEED, device="cuda")
     with pytest.raises(ValueError, match=r"device = 'gpu'; allowed: None, 'host', 'cuda'"):
         made("gpu")
     with pytest.raises(ValueError, match=r"render_mode, with a device, = 'rgb_array'; allowed: None"):
@@ -265,7 +254,7 @@ def test_what_is_asked_of_cupy(monkeypatch, mode):
     def there_by(made):
         return lambda *given, **named: made(*given, **named).view(There)
 
-    alike = (np.zeros, np.asarray, np.array, np.arange, np.argwhere, np.clip)
+    alike = (np.zeros, np.asarray, np.arange, np.argwhere, np.clip, np.flatnonzero, np.concatenate)
     cupy = types.SimpleNamespace(**{made.__name__: there_by(made) for made in alike}, asnumpy=np.array)
     cupy.RawModule = lambda path: types.SimpleNamespace(get_function=lambda name: RawKernel(path, name))
     cupy.cuda = types.SimpleNamespace(runtime=types.SimpleNamespace(getDeviceCount=lambda: 1))
