@@ -95,7 +95,9 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
         _track(world, seen.time[i], shared, e, queue, arrived, key, i)
         whole = math.floor(e.delay[i] + 1e-9)
         rest = max(0.0, e.delay[i] - whole)
-        again = acceleration.looked(own, i, tick)
+        # Where other lanes begin anew, all are looked at once more in the same period.
+        again = tick > 0 and own.tick[i] == tick
+        own.tick[i] = tick
         read = tick == 0 or not happens(key, tick, MISSED, e.figures.missed_periods[i])
         for axis in range(2):
             force = world.force[axis, i]
@@ -111,12 +113,16 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
                 newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
                 readings.force[axis, i] = newer + rest * (older - newer)
             if shared.share > 0.0:
-                gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
-                velocity = world.motion.velocity[axis, i]
-                value = acceleration.feel(own, i, axis, tick, velocity, gain, bias, shared.period, shared.share, again)
+                velocity, last = world.motion.velocity[axis, i], own.low_passed[axis, i]
+                if not again:
+                    # Where an episode begins nothing is known of the motion before it: the acceleration is taken for zero.
+                    change = velocity - (velocity if tick == 0 else own.velocity[axis, i])
+                    felt = (1.0 + e.acceleration_gain[axis, i]) * (change / shared.period) + e.acceleration_bias[axis, i]
+                    own.velocity[axis, i] = velocity
+                    own.low_passed[axis, i] = felt if tick == 0 else last + shared.share * (felt - last)
                 if read:
                     noise = noise_of(key, tick, acceleration.NOISE + axis, shared.acceleration_noise)
-                    readings.acceleration[axis, i] = value + noise
+                    readings.acceleration[axis, i] = own.low_passed[axis, i] + noise
         if read:
             stamp = arrived.time[i] + (e.figures.position_latency[i] - shared.stamped)
             readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
