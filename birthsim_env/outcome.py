@@ -58,7 +58,7 @@ def _close(world: World, seen: Seen, memory: int, about: About, tables: int, lan
         for i in range(n):
             if own.fresh[i] > 0.0:
                 # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
-                given = given_way(reference, world.force, i)
+                given = given_way(reference, world.force[0, i], world.force[1, i], i)
                 for axis in range(2):
                     own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
                 own.fresh[i], ends.failed[i], ends.success[i] = 0.0, 0.0, 0.0

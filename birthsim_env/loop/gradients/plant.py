@@ -23,6 +23,9 @@ from birthsim_env.physics.runge_kutta import STAGES
 ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]
 """Of the space, in the order of gradients: state, openings, force."""
 
+BEGINNING, PUSHED = 0, INPUTS - 2
+"""First point of a period, and the row at which the force stands."""
+
 
 @kernel
 def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: int) -> int:
@@ -37,9 +40,9 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     total[:STATES], by[:] = 0.0, 0.0
     dynamics.copy(weighs, late, n)
     dynamics.copy(weighs[STATES:], total[STATES:], n)
-    dynamics.copy(given, points[0], n)
+    dynamics.copy(given, points[BEGINNING], n)
     dynamics.copy(given[STATES:], u, n)
-    dynamics.copy(given[STATES + 4 :], f, n)
+    dynamics.copy(given[PUSHED:], f, n)
     lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
     back_over(adjoint, points, u, f, p, steps, step, late, x, g, by, total, n)
     dynamics.settle(late, n)

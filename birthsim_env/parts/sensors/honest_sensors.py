@@ -95,6 +95,7 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
         _track(world, seen.time[i], shared, e, queue, arrived, key, i)
         whole = math.floor(e.delay[i] + 1e-9)
         rest = max(0.0, e.delay[i] - whole)
+        newest, earlier = tick - int(whole), tick - int(whole) - 1
         # Where other lanes begin anew, all are looked at once more in the same period.
         again = tick > 0 and own.tick[i] == tick
         own.tick[i] = tick
@@ -110,8 +111,8 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
             for k in range(slots if tick == 0 else 1):
                 late[(tick + k) % slots, axis, i] = value
             if read:
-                newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
-                readings.force[axis, i] = newer + rest * (older - newer)
+                newer = late[newest % slots, axis, i]
+                readings.force[axis, i] = newer + rest * (late[earlier % slots, axis, i] - newer)
             if shared.share > 0.0:
                 velocity, last = world.motion.velocity[axis, i], own.low_passed[axis, i]
                 if not again:
