@@ -41,8 +41,6 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
     - ``DISABLED``: it waits for ``reset(options={"reset_mask": mask})`` with a mask (num_envs,) of bool.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012  Gymnasium declares it so
-
     @spelled_out()
     def __init__(
         self,
@@ -67,21 +65,18 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
         if device is None:
-            self._episodes = Episodes(assemble(int(num_envs), scenario, **arguments))
+            episodes = Episodes(assemble(int(num_envs), scenario, **arguments))
         else:
             one_of("render_mode, with a device,", render_mode, (None,))
             on_device = import_module("birthsim_build.device.episodes").DeviceEpisodes
             # Each setup prepares the parts that it is given for its own lanes.
-            self._episodes = on_device(device, int(num_envs), lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
-        setup = self._episodes.setup
-        frames = setup.frames_per_second
-        self.metadata = {**self.metadata, "render_fps": frames, "autoreset_mode": self.autoreset_mode}
+            episodes = on_device(device, int(num_envs), lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
+        setup = episodes.setup
+        self._show(episodes, autoreset_mode=self.autoreset_mode)
         self.num_envs = int(num_envs)
         self.single_observation_space, self.single_action_space = setup.single_observation_space, setup.single_action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.observation_names = setup.observation_names
-        self.simulation = setup.simulation
         self.steps = min(setup.steps, max_episode_steps or setup.steps)
         self._ended: NDArray[np.bool_] = self._episodes.arrays.zeros(self.num_envs, dtype=np.bool_)
 
