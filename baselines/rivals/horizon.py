@@ -17,6 +17,7 @@ from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
+from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph, Value
 from birthsim_env.physics.gradients.runge_kutta import STAGES, ahead_of, weight_of
@@ -39,12 +40,6 @@ class State(Joints):
     """What is predicted, besides the flows."""
 
     pressure = rows(4, "Pa", "of the chambers")
-
-
-class Flows(Rows):
-    """Into the chambers."""
-
-    chamber = rows(FLOWS, "kg/s", "into a chamber")
 
 
 class Forces(Rows):
@@ -96,15 +91,15 @@ def air_of(now: State, k: int, i: int, p: Rig) -> CylinderAir:
 
 @helper
 def rates(x: Array, q: Array, f: Array, p: Rig, dx: Array, i: int) -> None:
-    """Writes d(state)/dt ``dx`` of lane ``i`` for a ``State``, ``Flows`` and ``Forces``."""
-    now, flow, force, rate = State(x), Flows(q), Forces(f), State(dx)
+    """Writes d(state)/dt ``dx`` of lane ``i`` for a ``State``, flows (FLOWS, N) and ``Forces``."""
+    now, force, rate = State(x), Forces(f), State(dx)
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         now.position[0, i], now.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
     )
     index, gas_t = p.index, p.gas * p.temperature
     for k in range(2):
         v, dead, c = now.speed[k, i], p.dead_volume, air_of(now, k, i, p)
-        flow_p, flow_n = flow.chamber[2 * k, i], flow.chamber[2 * k + 1, i]
+        flow_p, flow_n = q[2 * k, i], q[2 * k + 1, i]
         rate.position[k, i] = v
         rate.pressure[2 * k, i] = control_model.polytropic_rate_p(c.pp, flow_p, v, c.ap, c.length_p + dead / c.ap, index, gas_t)
         rate.pressure[2 * k + 1, i] = control_model.polytropic_rate_n(
@@ -193,13 +188,9 @@ def step_to(
 ) -> None:  # fmt: skip
     """Takes ``x`` (8, n) and ``flows`` (4, n) to node ``k``; ``points`` (STAGES POINT, n) get rates and slopes."""
     step, kept = about.step[k], about.kept[k]
-    for row in range(STATE):
-        for i in range(n):
-            total[row, i] = x[row, i]
     trial = scratch(STATE)
-    for row in range(STATE):
-        for i in range(n):
-            trial[row, i] = x[row, i]
+    load(x, 0, n, total)
+    load(x, 0, n, trial)
     for stage in range(STAGES):
         left = 1.0 if stage == 0 else kept * kept if stage == 3 else kept
         for chamber in range(FLOWS):
@@ -214,12 +205,8 @@ def step_to(
             for i in range(n):
                 total[row, i] += weight * point[row, i]
                 trial[row, i] = x[row, i] + ahead * point[row, i]
-    for row in range(STATE):
-        for i in range(n):
-            x[row, i] = total[row, i]
-    for chamber in range(FLOWS):
-        for i in range(n):
-            flows[chamber, i] = q[chamber, i]
+    load(total, 0, n, x)
+    load(q, 0, n, flows)
 
 
 @helper
@@ -230,12 +217,10 @@ def _tangent_step(
     where it is this step's ``own``, else towards 0."""
     step, kept, end = about.step[k], about.kept[k], 1.0 if own else 0.0
     trial = scratch(MOVING)
+    load(s, 0, n, total)
     for row in range(STATE + FLOWS):
         for i in range(n):
             trial[row, i] = s[row, i] if row < STATE else 0.0
-    for row in range(STATE):
-        for i in range(n):
-            total[row, i] = s[row, i]
     for stage in range(STAGES):
         left = 1.0 if stage == 0 else kept * kept if stage == 3 else kept
         for i in range(n):
@@ -247,9 +232,7 @@ def _tangent_step(
             for i in range(n):
                 total[row, i] += weight * out[row, i]
                 trial[row, i] = s[row, i] + ahead * out[row, i]
-    for row in range(STATE):
-        for i in range(n):
-            s[row, i] = total[row, i]
+    load(total, 0, n, s)
 
 
 @helper

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
+from baselines.admittance.law import beyond
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
-from baselines.rivals.tracking import Integrals, TrackingController, beyond
+from baselines.rivals.tracking import Integrals, TrackingController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
