@@ -42,6 +42,12 @@ class State(Joints):
     pressure = rows(4, "Pa", "of the chambers")
 
 
+class Flows(Rows):
+    """Into the chambers."""
+
+    chamber = rows(FLOWS, "kg/s", "into a chamber")
+
+
 class Forces(Rows):
     """What acts on the pistons."""
 
@@ -91,15 +97,15 @@ def air_of(now: State, k: int, i: int, p: Rig) -> CylinderAir:
 
 @helper
 def rates(x: Array, q: Array, f: Array, p: Rig, dx: Array, i: int) -> None:
-    """Writes d(state)/dt ``dx`` of lane ``i`` for a ``State``, flows (FLOWS, N) and ``Forces``."""
-    now, force, rate = State(x), Forces(f), State(dx)
+    """Writes d(state)/dt ``dx`` of lane ``i`` for a ``State``, ``Flows`` and ``Forces``."""
+    now, flow, force, rate = State(x), Flows(q), Forces(f), State(dx)
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         now.position[0, i], now.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
     )
     index, gas_t = p.index, p.gas * p.temperature
     for k in range(2):
         v, dead, c = now.speed[k, i], p.dead_volume, air_of(now, k, i, p)
-        flow_p, flow_n = q[2 * k, i], q[2 * k + 1, i]
+        flow_p, flow_n = flow.chamber[2 * k, i], flow.chamber[2 * k + 1, i]
         rate.position[k, i] = v
         rate.pressure[2 * k, i] = control_model.polytropic_rate_p(c.pp, flow_p, v, c.ap, c.length_p + dead / c.ap, index, gas_t)
         rate.pressure[2 * k + 1, i] = control_model.polytropic_rate_n(
