@@ -27,25 +27,26 @@ NAN, INF = math.nan, math.inf
 RIG = Parameters()
 
 
-def environment(**given):
-    return gymnasium.make(CIRCLE, **given)
+def named(controller):
+    return make_controller(controller, RIG)
 
 
-def lanes(**given):
-    return gymnasium.make_vec(CIRCLE, num_envs=2, **given)
-
-
-def itself(**given):
-    """Without ``gymnasium.make``, which warns of a render mode first."""
-    return BirthSIMEnv("circle", **given)
-
-
-def lanes_themselves(**given):
-    return BirthSIMVectorEnv("circle", **given)
+environment = partial(gymnasium.make, CIRCLE)
+lanes = partial(gymnasium.make_vec, CIRCLE, num_envs=2)
+itself, lanes_themselves = partial(BirthSIMEnv, "circle"), partial(BirthSIMVectorEnv, "circle")
+"""Without ``gymnasium.make``, which warns of a render mode first."""
+residual_environment = partial(gymnasium.make, "BirthSIM/CircleResidual-v1")
+residual_lanes = partial(gymnasium.make_vec, "BirthSIM/CircleResidual-v1", num_envs=2)
+gains = partial(make_controller, "admittance[learn=false]", RIG)
+evaluation = partial(evaluate, PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False)
+linear = partial(linearize, None, (0.5, 0.0))
+limits = partial(PortLimiter, named("shut-valves"), RIG)
+score = partial(normalized_score, environment=CIRCLE, score=1.0)
+training, residual = partial(override, TrainingSettings()), partial(override, ResidualSettings())
 
 
 def ranges(**given):
-    return gymnasium.make(CIRCLE, randomize=given)
+    return environment(randomize=given)
 
 
 def options(**given):
@@ -56,48 +57,8 @@ def rig(**given):
     return RIG.replace(given)
 
 
-def named(controller):
-    return make_controller(controller, RIG)
-
-
-def gains(**given):
-    return make_controller("admittance[learn=false]", RIG, **given)
-
-
 def listed_option(controller, **given):
-    return make_controller(f"{controller}[{','.join(f'{name}={value}' for name, value in given.items())}]", RIG)
-
-
-def evaluation(**given):
-    return evaluate(PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False, **given)
-
-
-def linear(**given):
-    return linearize(None, (0.5, 0.0), **given)
-
-
-def limits(**given):
-    return PortLimiter(named("shut-valves"), RIG, **given)
-
-
-def residual_environment(**given):
-    return gymnasium.make("BirthSIM/CircleResidual-v1", **given)
-
-
-def residual_lanes(**given):
-    return gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=2, **given)
-
-
-def score(**given):
-    return normalized_score(**{"environment": CIRCLE, "score": 1.0, **given})
-
-
-def training(**given):
-    return override(TrainingSettings(), **given)
-
-
-def residual(**given):
-    return override(ResidualSettings(), **given)
+    return named(f"{controller}[{','.join(f'{name}={value}' for name, value in given.items())}]")
 
 
 def hand(kind, *fixed, **given):

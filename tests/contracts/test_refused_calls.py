@@ -23,7 +23,7 @@ from studies.labour.model import Labour
 from studies.verification.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
-NAN, INF = math.nan, math.inf
+NAN = math.nan
 RIG = Parameters()
 STILL = np.zeros((4, 2)), np.zeros((2, 2))
 PHASES = {"times": (0.0, 1.0), "closed_loop": (2e3, 4e3), "pneumatic1": (4600.0, 3600.0), "pneumatic2": (2300.0, 1800.0)}
@@ -44,64 +44,31 @@ class Wrong(ForceProfile):
         return [(0.0, 1.0)]
 
 
-def env(**given):
-    return lambda: gymnasium.make(CIRCLE, **given)
+def later(function, *fixed, **always):
+    """What makes a call of a function, which is made later: ``fixed`` and ``always`` are given to each."""
+    return lambda *given, **named: lambda: function(*fixed, *given, **always, **named)
 
 
-def started(**given):
-    return lambda: gymnasium.make(CIRCLE, **given).reset(seed=0)
+def reset(*fixed, make=gymnasium.make, seed=0, **given):
+    return make(CIRCLE, *fixed, **given).reset(seed=seed)
 
 
-def lanes(**given):
-    return lambda: gymnasium.make_vec(CIRCLE, num_envs=2, **given).reset(seed=0)
-
-
-def seeded(seed):
-    return lambda: gymnasium.make_vec(CIRCLE, num_envs=3).reset(seed=seed)
-
-
-def paper(**given):
-    return lambda: BacksteppingController(RIG, **given)
-
-
-def schedule(**given):
-    return lambda: StiffnessSchedule(**given)
-
-
-def labour(**given):
-    return lambda: Labour(**given)
+env, started = later(gymnasium.make, CIRCLE), later(reset)
+lanes = later(reset, make=gymnasium.make_vec)
+paper, schedule, labour = later(BacksteppingController, RIG), later(StiffnessSchedule), later(Labour)
+residual, plant, stage = later(ResidualSettings), later(Plant), later(Stage, lambda *_: 0)
 
 
 def linear(pose=(0.5, 0.0), parameters=None, **given):
     return lambda: linearize(parameters, pose, **given)
 
 
-def residual(*given, **named):
-    return lambda: ResidualSettings(*given, **named)
-
-
-def stage(**given):
-    return lambda: Stage(lambda *_: 0, **given)
-
-
-def plant(*given, **named):
-    return lambda: Plant(*given, **named)
-
-
 def rates(of_state, of_flows):
     return lambda: strict_feedback_rates(np.zeros((of_state, 2)), np.zeros((of_flows, 2)), RIG)
 
 
-def duration(seconds):
-    return lambda: propose(RIG, seconds)
-
-
 def streams():
     return Streams(np.array([1, 2], dtype=np.uint64), np.zeros(2, dtype=np.int64), "reference")
-
-
-def shifted(discount):
-    return lambda: ShiftedReward(None, 1.0, discount)
 
 
 TABLE = {
@@ -118,8 +85,8 @@ TABLE = {
     ("'gain'", "name[gain=60,other=2]"): [lambda: make_controller("pid[gain]", RIG)],
     ("controller = 'nobody'", "backstepping, "): [lambda: make_controller("nobody[gain=3]", RIG)],
     ("controller = 'limited:none'", ""): [lambda: make_controller("limited:none", RIG)],
-    ("duration = ", ">= 4 and <= 600 (s)"): [duration(value) for value in (0.0, 3.9, 601.0, NAN)],
-    ("discount = ", "0 or more and less than 1"): [shifted(value) for value in (-0.1, 1.0, 2.0, NAN)],
+    ("duration = ", ">= 4 and <= 600 (s)"): [later(propose, RIG)(value) for value in (0.0, 3.9, 601.0, NAN)],
+    ("discount = ", "0 or more and less than 1"): [later(ShiftedReward, None, 1.0)(value) for value in (-0.1, 1.0, 2.0, NAN)],
     ("informed = 'yes'", "True, False"): [residual(informed="yes")],
     ("range ", "a finite number or (low, high) of such"): [
         lambda bad=bad: draw(bad, np.random.default_rng(0)) for bad in ((2.0, 1.0), (1.0, 2.0, 3.0), (0.0, NAN), ("a", "b"))
@@ -189,7 +156,9 @@ TABLE = {
     ],
     ("mechanics.mas", "mass"): [env(randomize={"mechanics.mas": (2, 5)})],
     ("motor", "mechanics"): [env(randomize={"motor.mass": (2, 5)})],
-    ("mass", "mechanics"): [env(randomize={"mass": (2, 5)})],
+    ("did you mean 'mechanics.mass'?", "mechanics"): [env(randomize={"mass": (2, 5)})],
+    ("did you mean 'cylinder1.stroke' or 'cylinder2.stroke'?", ""): [env(randomize={"stroke": (1, 2)})],
+    ("parameters: a = 1", "a section"): [env(parameters={"a": 1})],
     ("3", ""): [env(randomize={3: (2, 5)})],
     ("Mechanics.mass = 0.0", "> 0"): [env(randomize={"mechanics.mass": (0.0, 3.0)})],
     ("critical_ratio = 0.95", "0.9"): [env(randomize={"valves.critical_ratio": (0.2, 0.95)})],
@@ -211,7 +180,7 @@ TABLE = {
     ("supply_pressure", ""): [
         env(parameters=RIG.replace({"air.supply_pressure": 1.5e5}), randomize={"air.atmospheric_pressure": (1.0e5, 1.9e5)}),
     ],
-    ("seed", ""): [seeded(seed) for seed in ([1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc")],
+    ("seed", ""): [lanes(num_envs=3, seed=seed) for seed in ([1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc")],
     ("parameters has 3 entries", "2 lanes"): [plant(parameters=[RIG] * 3, num_envs=2)],
     ("parameters[1] = 7", "a Parameters"): [plant(parameters=[RIG, 7], num_envs=2)],
     ("state has shape (17, 2)", "(18, 2)"): [lambda: Plant(num_envs=2).derivatives(np.zeros((17, 2)), *STILL)],
@@ -262,4 +231,4 @@ def test_a_refused_call_says_what_is_wrong_and_what_is_allowed(call, named, allo
 
 def test_gymnasium_refuses_a_negative_seed():
     with pytest.raises(gymnasium.error.Error, match="greater or equal to zero"):
-        seeded(-1)()
+        lanes(seed=-1)()
