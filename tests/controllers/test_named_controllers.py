@@ -69,12 +69,14 @@ def test_two_files_of_one_name_are_two_controllers(tmp_path):
     assert numpy is np
 
 
-def test_the_named_controllers_are_the_law_with_and_without_weight():
+def test_short_names_of_the_papers_law_have_their_options():
     assert {"backstepping", "admittance", "residual"} <= set(controller_names())
     env = gymnasium.make_vec(CIRCLE, num_envs=2)
     env.reset(seed=0)
-    for name, weight in (("backstepping", False), ("backstepping-weight", True)):
-        expected = BacksteppingController(RIG, weight_compensation=weight).command(env.measurement, env.reference)
+    weight = {"weight_compensation": True}
+    names = {"backstepping": {}, "backstepping-weight": weight, "backstepping-frozen": {**weight, "frozen_friction": True}}
+    for name, options in names.items():
+        expected = BacksteppingController(RIG, **options).command(env.measurement, env.reference)
         np.testing.assert_array_equal(make_controller(name, RIG).command(env.measurement, env.reference), expected)
 
 

@@ -1,6 +1,5 @@
 """The observer of piston speeds: poles, bias and delay on made-up samples, errors on a rig that a tracker watches."""
 
-import dataclasses
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -118,20 +117,6 @@ def test_position_and_speed_of_a_moving_rig(rig: Parameters, position: tuple[flo
     assert np.abs(seen["piston error"].mean(axis=(0, 2))).max() < 1e-5, "no offset"
 
 
-@pytest.mark.parametrize(
-    ("rate", "latency"),
-    [*(pytest.param(240.0, late, marks=pytest.mark.slow) for late in (0.0, 0.05)), (240.0, 0.004), (60.0, 0.004)],
-)
-def test_the_trackers_delay_is_made_up_for(rate: float, latency: float) -> None:
-    """Without noise: the time by which the estimate trails the motion, fitted by least squares over the circle."""
-    changes = {"position_rate": rate, "position_latency": latency, "position_noise": 0.0, "pressure_noise": 0.0}
-    rig = closed_loop.FRICTIONLESS.replace({f"electronics.{name}": value for name, value in changes.items()})
-    seen = watched(rig, 1, 3.0)
-    trail = -(seen["piston error"] * seen["speed"]).sum(axis=(0, 2)) / (seen["speed"] ** 2).sum(axis=(0, 2))
-    assert np.abs(trail).max() < 2e-5, "s"
-    assert rms(seen["piston error"]).max() < 1e-4
-
-
 def recorded(lanes: int, seconds: float) -> list[Measurement]:
     """Measurements of a rig on the circle through the tracker."""
     rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), closed_loop.tracker(closed_loop.FRICTIONLESS, lanes)
@@ -152,57 +137,3 @@ def test_an_observer_starts_from_what_the_tracker_shows() -> None:
             np.testing.assert_allclose(got[2:, 0], shown, rtol=1e-9)
             assert np.abs(expected[2:]).max() > 0.01
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6)
-
-
-class Differences:
-    """The law with the tracker's positions and low-passed differences as they are, without an observer."""
-
-    def __init__(self, law: BacksteppingController) -> None:
-        self.law = law
-
-    def command(self, measured: Measurement, reference: Reference) -> Array:
-        return self.law.command(dataclasses.replace(measured, sampled=False), reference)
-
-
-def on_the_circle(
-    rig: Parameters, setpoints: tuple[float, ...], observed: bool, seconds: float = 5.0
-) -> tuple[Array, Array, Array]:
-    """Errors of the end effector after 1 s with M setpoints: RMS and maximum on both axes, (2, M), m; and the fraction of time
-    with a saturated valve, (M,)."""
-    each, lanes = 8, 8 * len(setpoints)
-    reference, law = circle(lanes, np.repeat(setpoints, each)), BacksteppingController(rig, weight_compensation=True)
-    plant, errors, full = closed_loop.resting_at(reference(0.0), rig), [], []
-    command = law.command if observed else Differences(law).command
-    path = closed_loop.run(plant, command, reference, lambda t: np.zeros((2, lanes)), seconds, closed_loop.tracker(rig, lanes))
-    for time, wanted, _, openings in path:
-        if time > 1:
-            errors.append(plant.end_effector()[:2] - wanted.position)
-            full.append(np.abs(openings) >= 1)
-    assert np.isfinite(errors).all()
-    error = np.reshape(errors, (-1, 2, len(setpoints), each))
-    saturated = np.reshape(full, (-1, 4, len(setpoints), each)).mean(axis=(0, 1, 3))
-    return np.sqrt((error**2).mean(axis=(0, 3))), np.abs(error).max(axis=(0, 3)), saturated
-
-
-@pytest.mark.parametrize(
-    ("rig", "setpoints", "typical", "most"),
-    [
-        (closed_loop.FRICTIONLESS, (1000.0, 2000.0, 4000.0), (1e-4, 1e-4, 1e-4), (4e-4, 4e-4, 5e-4)),
-        (Parameters(), (2000.0, 4000.0), (9e-4, 6e-4), (5e-3, 4e-3)),
-    ],
-    ids=["frictionless", "LuGre"],
-)
-def test_the_law_holds_the_circle_on_a_trackers_samples(
-    rig: Parameters, setpoints: tuple[float, ...], typical: tuple[float, ...], most: tuple[float, ...]
-) -> None:
-    root_mean_square, greatest, saturated = on_the_circle(rig, setpoints, observed=True)
-    assert np.all(root_mean_square < typical)
-    assert np.all(greatest < most)
-    assert np.all(saturated < 0.03)
-
-
-def test_without_the_observer_a_stiff_setpoint_is_lost() -> None:
-    """At 4000 N/m the delay of low-passed differences destabilises what the observer holds within half a millimetre."""
-    root_mean_square, _, saturated = on_the_circle(closed_loop.FRICTIONLESS, (4000.0,), observed=False, seconds=2.0)
-    assert root_mean_square.max() > 0.01
-    assert saturated[0] > 0.1

@@ -67,18 +67,6 @@ def test_gradients_are_numbers_where_episodes_begin() -> None:
     assert np.abs(carried).max() > 0.0
 
 
-@pytest.mark.slow
-def test_converters_of_many_bits_have_the_gradients_of_none() -> None:
-    """What is rounded passes straight through."""
-    found = []
-    for bits in (0.0, 32.0):
-        rig = Parameters().replace({"electronics.adc_bits": bits, "electronics.dac_bits": bits})
-        env = begun("BirthSIM/Circle-v1", 8, "pid", sensors="honest", parameters=rig)
-        found.append(env.simulation.vjp(np.zeros((0, 8)))(motion=np.ones((4, 8)))[0])
-    none, fine = found
-    assert np.all(np.abs(fine - none) <= 1e-4 * np.abs(none) + 1e-6 * np.abs(none).max(axis=1, keepdims=True))
-
-
 def test_observations_state_and_motion_have_gradients() -> None:
     """Openings drive pistons: what an observed error, the true place and a piston say of it is the same."""
     env = lanes_of(40)

@@ -19,6 +19,13 @@ from birthsim_env.physics.rig.parameters import Parameters
 FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
 """Neither Coulomb nor Stribeck friction; the viscous part stays."""
 
+
+def slippery(scale: float, law: str = "lugre") -> Parameters:
+    """The rig with ``scale`` times its Coulomb friction, 12 and 15 N."""
+    coulomb = {"cylinder1.coulomb_friction": 12.0 * scale, "cylinder2.coulomb_friction": 15.0 * scale}
+    return Parameters().replace({**coulomb, "friction.law": law})
+
+
 PNEUMATIC_STIFFNESS = np.array([[4400.0], [2200.0]])
 """N/m, of both cylinders: inside the range of (9) at all poses that the tests use."""
 
