@@ -1,6 +1,7 @@
 """birthsim animate: both runs are those of the environments, at the same instants, and what is written plays in real time."""
 
 import re
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -12,25 +13,14 @@ from baselines.commands import animate
 from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from baselines.staged import driving
-from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.drawing.rendering import PairRenderer
 from tests.console import call
+from tests.env.test_rendering import SCENE
 
 RIG = birthsim_env.Parameters()
 
 
-def scene(**values):
-    fixed = {
-        "time": 1.0,
-        "piston": (0.0, 0.02),
-        "target": (0.5, 0.0),
-        "compliant_target": (0.52, 0.0),
-        "user_force": (100.0, 0.0),
-        "pressures": (2e5, 3e5, 4e5, 5e5),
-        "stiffness": (4000.0, 4000.0),
-        "path": np.zeros((0, 2)),
-        "title": "test",
-    }
-    return Scene(**{**fixed, **values})
+SHOWN = replace(SCENE, piston=(0.0, 0.02), target=(0.5, 0.0), compliant_target=(0.52, 0.0), user_force=(100.0, 0.0))
 
 
 @pytest.fixture
@@ -108,10 +98,10 @@ def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch, ca
 
 def test_both_halves_have_one_scale_and_their_own_error(pair):
     times = np.array([0.0, 0.5, 1.0])
-    same = pair.frame((scene(), scene()), times, 2 * (np.array([0.0, 0.005, 0.003]),))
+    same = pair.frame((SHOWN, SHOWN), times, 2 * (np.array([0.0, 0.005, 0.003]),))
     left, right = same[70:595, :478], same[70:595, 482:960]
     assert np.abs(left[:, 2:476].astype(int) - right[:, :474]).mean() < 1.0
-    other = pair.frame((scene(), scene()), times, (np.array([0.0, 0.005, 0.003]), np.array([0.0, 0.001, 0.009])))
+    other = pair.frame((SHOWN, SHOWN), times, (np.array([0.0, 0.005, 0.003]), np.array([0.0, 0.001, 0.009])))
     assert (other[:, :480] == same[:, :480]).all()
     assert (other[:, 480:] != same[:, 480:]).any()
 
@@ -121,5 +111,5 @@ def test_both_halves_have_one_scale_and_their_own_error(pair):
 )
 def test_what_is_not_finite_is_left_out(values, pair):
     assert pair.frame(
-        (scene(**values), scene()), np.array([0.0, 1.0]), (np.array([0.0, np.inf]), np.array([np.nan, 0.1]))
+        (replace(SHOWN, **values), SHOWN), np.array([0.0, 1.0]), (np.array([0.0, np.inf]), np.array([np.nan, 0.1]))
     ).any()

@@ -53,9 +53,7 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     assert_picture(out, "error_over_time")
 
 
-def test_evaluate_takes_a_rig_and_a_controller_from_files_and_survives_the_loss_of_every_episode(
-    tmp_path, monkeypatch, capsys
-):
+def test_evaluate_takes_a_rig_and_a_controller_from_files_and_survives_the_loss_of_every_episode(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 3.5\n")
     world = ("--env", "BirthSIM/Probe-v2", "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")

@@ -9,24 +9,16 @@ from baselines.commands import tune
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from tests.console import call, strict
+from tests.console import OWN, call, strict
 
-OWN = """
-import numpy as np
-
-class Own:
-    TUNABLE = {"stiff": (1.0, 10000.0), "fraction": (0.0, 2.0)}
+BOUNDS = {"stiff": (1.0, 10000.0), "fraction": (0.0, 2.0)}
+TUNED = f"""
+class Own(Held):
+    TUNABLE = {BOUNDS}
 
     def __init__(self, parameters, stiff=2.0, fraction=2.0):
         self.gains = stiff, fraction
-
-    def reset(self, lanes=None):
-        pass
-
-    def command(self, measurement, reference):
-        return np.zeros((4, measurement.position.shape[1]))
 """
-BOUNDS = {"stiff": (1.0, 10000.0), "fraction": (0.0, 2.0)}
 BEST = (400.0, 0.6)
 
 
@@ -34,7 +26,7 @@ BEST = (400.0, 0.6)
 def own(tmp_path):
     """A controller in a file."""
     path = tmp_path / "own.py"
-    path.write_text(OWN)
+    path.write_text(OWN + TUNED)
     return f"{path}:Own"
 
 

@@ -10,10 +10,12 @@ from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
 from baselines.backstepping.lyapunov import LyapunovFunction
+from baselines.controller import checked_command
 from baselines.identification.experiment import propose
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
 from birthsim_env.drawing.rendering import Renderer
+from birthsim_env.gradients import Recorder
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.seeding import draw
@@ -65,6 +67,27 @@ def linear(pose=(0.5, 0.0), parameters=None, **given):
 
 def rates(of_state, of_flows):
     return lambda: strict_feedback_rates(np.zeros((of_state, 2)), np.zeros((of_flows, 2)), RIG)
+
+
+def pullback(changes):
+    return Plant(RIG.replace(changes)).vjp(np.zeros((4, 1)), np.zeros((2, 1)), 0.01)
+
+
+def recorder(**given):
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, **given).unwrapped
+    env.reset(seed=0)
+    return Recorder(env.simulation).prepare()
+
+
+COMMANDS = (
+    (np.zeros(4), "command() returned an array (4,)"),
+    ([[0.0] * 2] * 3, "command() returned an array (3, 2)"),
+    (None, "command() returned None"),
+    ("open", "command() returned 'open'"),
+    (np.full((4, 2), np.nan), "command()[0, 0] = nan"),
+    (np.full((4, 2), 1.5), "command()[0, 0] = 1.5"),
+)
+"""What a controller's command returns, and how it is named."""
 
 
 def streams():
@@ -180,6 +203,17 @@ TABLE = {
     ("supply_pressure", ""): [
         env(parameters=RIG.replace({"air.supply_pressure": 1.5e5}), randomize={"air.atmospheric_pressure": (1.0e5, 1.9e5)}),
     ],
+    ("mechanics.mode_frequency", "at their defaults"): [
+        later(pullback)({name: value}) for name, value in (("air.supply_conductance", 1e-8), ("mechanics.mode_frequency", 20.0))
+    ],
+    ("user's own part", ""): [later(recorder)(user_force=lambda time: (0.0, 0.0))],
+    ("valves.deadband", ""): [
+        later(pullback)({"valves.deadband": 0.1}), later(recorder)(randomize={"valves.deadband": (0.01, 0.02)}),
+    ],
+    **{
+        (f"controller 'mine': {words}", "an array (4, 2)"): [later(checked_command, "mine")(returned, 2)]
+        for returned, words in COMMANDS
+    },
     ("seed", ""): [lanes(num_envs=3, seed=seed) for seed in ([1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc")],
     ("parameters has 3 entries", "2 lanes"): [plant(parameters=[RIG] * 3, num_envs=2)],
     ("parameters[1] = 7", "a Parameters"): [plant(parameters=[RIG, 7], num_envs=2)],

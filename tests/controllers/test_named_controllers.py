@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import checked_command
 from baselines.registry import SHORT_NAMES, controller_names, make_controller, resolved
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
@@ -89,20 +88,3 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
         assert one.function is other.function
         np.testing.assert_array_equal(one.constants, other.constants)
-
-
-@pytest.mark.parametrize(
-    ("returned", "words"),
-    [
-        (np.zeros(4), r"returned an array \(4,\)"),
-        ([[0.0] * 2] * 3, r"returned an array \(3, 2\)"),
-        (None, "returned None"),
-        ("open", "returned 'open'"),
-        (np.full((4, 2), np.nan), r"command\(\)\[0, 0\] = nan"),
-        (np.full((4, 2), 1.5), r"command\(\)\[0, 0\] = 1\.5"),
-    ],
-)
-def test_a_command_that_is_none_is_refused_by_name(returned, words):
-    with pytest.raises(ValueError, match=rf"controller 'mine': .*{words}; allowed: spool openings .* an array \(4, 2\)"):
-        checked_command("mine", returned, 2)
-    assert checked_command("mine", [[0.0, 1.0]] * 4, 2).shape == (4, 2)

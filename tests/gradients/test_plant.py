@@ -7,7 +7,6 @@ import numba
 import numpy as np
 import pytest
 
-from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
@@ -97,14 +96,6 @@ def test_parameters_follow_by_the_chain_rule() -> None:
         np.testing.assert_allclose(column, difference, rtol=1e-8, atol=1e-8 * np.abs(difference).max())
     with pytest.raises(ValueError, match=r"geometry\.d3.*allowed"):
         rig_jacobian(rig, ("geometry.d3",))
-
-
-@pytest.mark.parametrize(
-    ("field", "value"), [("air.supply_conductance", 1e-8), ("mechanics.mode_frequency", 20.0), ("valves.deadband", 0.1)]
-)
-def test_options_are_refused_by_name(field: str, value: float) -> None:
-    with pytest.raises(ValueError, match=field):
-        Plant(Parameters().replace({field: value})).vjp(np.zeros((4, 1)), np.zeros((2, 1)), DURATION)
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads the processor's instructions")
