@@ -28,6 +28,7 @@ MATRICES = (
 )
 """Symmetric positive definite, N/m, with eigenvalues from 1000 to 4200."""
 
+
 ANOTHER = Parameters().replace(
     {
         "geometry.gamma3": 1.4, "mechanics.mass": 4.2, "cylinder1.viscous_friction": 55.0, "cylinder2.viscous_friction": 12.0,

@@ -16,16 +16,10 @@ from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.compiled.lanes import SPOOLS, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.oracles import closed_loop, rigid_body
 from tests.oracles import linkage_by_points as by_points
-from tests.oracles import rigid_body
 
 PERIOD = 1e-3
-ANOTHER = Parameters().replace(
-    {
-        "geometry.gamma3": 1.4, "mechanics.mass": 4.2, "cylinder1.viscous_friction": 55.0, "cylinder2.viscous_friction": 12.0,
-        "air.polytropic_index": 1.3, "valves.time_constant": 0.006,
-    }
-)  # fmt: skip
 
 
 def remembered(lanes: int) -> Memory:
@@ -81,7 +75,7 @@ def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, fract
     return motion, measured
 
 
-@pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
+@pytest.mark.parametrize("rig", [Parameters(), closed_loop.ANOTHER], ids=["default", "another rig"])
 @pytest.mark.parametrize("fraction", [0.0, 1.0], ids=["told of nothing", "told of forces"])
 def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters, fraction: float) -> None:
     """j = jr - 3 c (a - ar) - (3 c^2 + 2)(v - vr) - (c^3 + 2 c)(x - xr), a with all that is known.
@@ -160,7 +154,7 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
 @pytest.mark.parametrize("lead_time", [0.0015, 0.01])
 def test_the_law_leads_every_spool_from_where_it_is(lead_time: float) -> None:
     """After one period the plant's spools have gone the fraction 1 - exp(-T/lead) of their ways to what the law wants."""
-    rig, lanes = ANOTHER, 40
+    rig, lanes = closed_loop.ANOTHER, 40
     now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.05, push=3.0)
     nothing = np.zeros((2, lanes))
     motion, _ = near(now, rig, nothing, seed=1)
