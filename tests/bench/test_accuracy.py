@@ -6,34 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.accuracy import errors as accuracy
 from studies.accuracy import tables as accuracy_tables
 from studies.accuracy.figure import accuracy_figure
 from studies.accuracy.motions import MOTIONS, strong
-
-
-def test_the_rigs_are_of_the_documented_ranges() -> None:
-    rigs, ranges = accuracy.rigs_to_measure(Parameters(), 3, 0), documented_ranges(Parameters())
-    assert list(rigs) == [
-        "nominal",
-        "quick corner",
-        "slow corner",
-        *(f"{kind} {k}" for kind in ("corner", "draw") for k in (1, 2, 3)),
-    ]
-    for name, rig in rigs.items():
-        for dotted, (low, high) in ranges.items():
-            section, _, field = dotted.partition(".")
-            value = getattr(getattr(rig, section), field)
-            assert low <= value <= high
-            if "corner" in name:
-                assert value in (low, high), "a corner has every figure at one end of its range"
-    assert rigs["quick corner"].valves.time_constant == 0.0015
-    assert rigs["slow corner"].mechanics.mass == 5.0
-    assert rigs == accuracy.rigs_to_measure(Parameters(), 3, 0)
-    assert rigs["draw 1"] != accuracy.rigs_to_measure(Parameters(), 3, 1)["draw 1"]
 
 
 @pytest.mark.parametrize(("method", "order"), accuracy.EVALUATIONS.items())

@@ -12,13 +12,11 @@ from baselines.bench.pieces import controller_settings, file_stem
 from birthsim_env import Parameters
 from studies.comparison import figure as comparison_figures
 from studies.comparison.grid import (
-    ENVIRONMENTS,
     METRICS,
     MOVING,
     PLANTS,
     REFERENCE,
     Conditions,
-    all_conditions,
     cell_task,
     costs,
     gather,
@@ -61,22 +59,6 @@ def test_every_controller_meets_the_same_worlds_and_every_episode_another(plant,
     for world in ([*env.simulation.reference.rows, *env.simulation.force] for env in made[1:]):
         np.testing.assert_array_equal(world, [*made[0].simulation.reference.rows, *made[0].simulation.force])
     assert len(np.unique(made[0].simulation.reference.rows, axis=1).T) == 3
-
-
-def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
-    assert len(all_conditions()) == 30
-    moving = [conditions for conditions in all_conditions() if conditions.hand]
-    assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
-    assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
-    assert str(moving[0]) == "Circle, ideal sensors, drawn rig, moving hand: sine"
-    assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
-    assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
-        *("Circle", "Probe", "Descent", "Forceps", "Dystocia", "Vacuum")
-    ]
-    assert str(PROBE) == "Probe, ideal sensors, nominal rig"
-    drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]
-    assert {one.sensors for one in drawn} == {"honest"}, "the only ones whose figures can be drawn"
-    assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal rig"
 
 
 def test_settings_tell_a_file_from_its_next_version_and_controllers_have_files_of_their_own(tmp_path):

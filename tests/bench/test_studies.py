@@ -15,13 +15,11 @@ from birthsim_env.physics.plant import Plant
 from studies.comparison import stiffness as studies
 from studies.comparison import stiffness_figures as study_figures
 from studies.comparison.stiffness import (
-    STUDIES,
     disturbance_study,
     ellipse_study,
     frictionless,
     polar_study,
     stiffness_study,
-    study_tasks,
 )
 
 RIG = Parameters()
@@ -84,17 +82,6 @@ def test_ellipse_study_recovers_any_matrix_and_marks_a_lost_pose(spring):
     for k in (0, 2):
         np.testing.assert_allclose(result["stiffness"][k], spring["stiffness"])
     np.testing.assert_array_equal(spring["probes"].stiffness[:, 0], [3000, 1500, 800])
-
-
-def test_studies_of_all_controllers_and_disturbances_of_the_law_alone():
-    tasks = study_tasks([{"controller": name, "source": "", "rig": RIG.to_dict()} for name in ("backstepping", "pid")], RIG)
-    assert set(tasks) == {(study, name) for study in STUDIES for name in ("backstepping", "pid")} | {
-        ("disturbance", f"backstepping, {label}") for label in ("with friction", "frictionless")
-    }
-    assert len({task.name for task in tasks.values()}) == len(tasks)
-    smooth = tasks["disturbance", "backstepping, frictionless"].settings["rig"]
-    assert smooth["cylinder1"]["coulomb_friction"] == smooth["cylinder2"]["coulomb_friction"] == 0
-    assert smooth["cylinder1"]["viscous_friction"] == 35
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.0), (0.0, -40.0), (30.0, 20.0)])

@@ -134,7 +134,7 @@ def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int, resting: f
 
 
 def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
-    """From c to the rest's c with the time constant MOTION_TIME; at once back to c when it moves."""
+    """From c to the rest's c with a time constant of a tenth of a second; at once back to c when it moves."""
     rig, lanes, error = Parameters(), 1, 5e-5
     now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.0, push=0.0)
     nothing = np.zeros((2, lanes))
@@ -145,7 +145,7 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
         moving = float(tick in (0, 399))
         openings = law.command(now, motion, nothing, nothing, moving=moving, memory=memory)
         stiffnesses.append(-rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1][0, 0] / error)
-    decay = np.exp(-PERIOD * np.arange(399) / admittance_law.MOTION_TIME)
+    decay = np.exp(-PERIOD * np.arange(399) / 0.1)
     c = 30.0 + 30.0 * decay
     np.testing.assert_allclose(stiffnesses[:399], c**3 + 2 * c, rtol=1e-4)
     assert stiffnesses[399] == pytest.approx(60.0**3 + 120.0, rel=1e-4)
