@@ -58,7 +58,8 @@ def test_the_least_damping_is_that_of_a_fine_search_and_soft_setpoints_get_more_
     least = gains.least_damping(stiffness, mass, viscous)
     searched = min(closed_loop_damping(c1, c2, c1, mass, viscous) for c1, c2 in zip(outer[::4], inner[::4], strict=True))
     assert least == pytest.approx(searched, rel=1e-6)
-    with pytest.raises(ValueError, match=rf"no positive gains .* allowed: at least {least:.6g}"):
+    ratio = least / (2 * np.sqrt(stiffness * mass))
+    with pytest.raises(ValueError, match=rf"no positive gains .* allowed: at least {least:.6g} N s/m \(ratio {ratio:.4g}\)"):
         gains_for(stiffness, mass, viscous, 0.999 * least)
     c1 = gains.outer_gain(stiffness, 1.5 * least, mass, viscous)
     c2 = gains.inner_gain(c1, stiffness, mass, viscous)
