@@ -32,17 +32,6 @@ def test_exact_sensors_and_friction_off_by_a_quarter(law: str, monkeypatch: pyte
     assert hunting.max() < 0.01
 
 
-def test_coupled_setpoints_through_friction(monkeypatch: pytest.MonkeyPatch) -> None:
-    """[[3000, 800], [800, 1500]] N/m: displacements along and across the push."""
-    closed_loop.shorten_probes(monkeypatch)
-    probes = closed_loop.pushes((15.0, -30.0), (3000.0,), [closed_loop.slippery(scale) for scale in (0.75, 1.25)])
-    probes.stiffness[1:] = [[1500.0], [800.0]]
-    answers = run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False))
-    off = np.hypot(*(answers.displacement - answers.expected)) / np.hypot(*answers.expected)
-    assert np.hypot(*answers.expected).min() > 0.005
-    assert off.max() < 0.002
-
-
 @pytest.mark.parametrize(
     ("law", "forces", "seed"),
     [
