@@ -1,29 +1,14 @@
-"""The bench: paired worlds, lost episodes and ratios in its figures, its tables and its pictures."""
+"""The comparison: settings, lost episodes and ratios in its figures, its tables and its pictures."""
 
 import csv
 import math
 
-import gymnasium
-import numpy as np
 import pytest
 
-from baselines.bench import evaluation
 from baselines.bench.pieces import controller_settings, file_stem
 from birthsim_env import Parameters
 from studies.comparison import figure as comparison_figures
-from studies.comparison.grid import (
-    METRICS,
-    MOVING,
-    PLANTS,
-    REFERENCE,
-    Conditions,
-    cell_task,
-    costs,
-    gather,
-    run_cell,
-    settings_of,
-    statistics,
-)
+from studies.comparison.grid import METRICS, MOVING, REFERENCE, Conditions, costs, gather, statistics
 from studies.comparison.tables import OWN_HAND, data, losses, overview
 from tests.controllers.test_named_controllers import OWN
 
@@ -31,34 +16,6 @@ RIG = Parameters()
 CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
 PROBE = Conditions("BirthSIM/Probe-v2", "ideal", "nominal")
 INF = math.inf
-
-
-def cell(controller, conditions=PROBE, episodes=3, seed=4):
-    (settings,) = settings_of(controller, RIG).values()
-    return run_cell(**cell_task(settings, conditions, episodes, seed).settings)
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_every_controller_meets_the_same_worlds_and_every_episode_another(plant, monkeypatch):
-    """At the end of 0.4 s; the scenario is the same with every plant."""
-    made, make_vec = [], gymnasium.make_vec
-
-    def short(*args, **kwargs):
-        made.append(make_vec(*args, max_episode_steps=400, **kwargs))
-        return made[-1]
-
-    monkeypatch.setattr(evaluation.gymnasium, "make_vec", short)
-    conditions = Conditions("BirthSIM/Circle-v1", "honest" if plant.endswith("-sensors") else "lab", plant)
-    law, weight = cell("backstepping", conditions), cell("backstepping-weight", conditions)
-    cell("backstepping", Conditions("BirthSIM/Circle-v1", "lab", "nominal"))
-    assert law["seeds"] == weight["seeds"] == [4, 5, 6]
-    assert law["metrics"]["error_rms_x"] != weight["metrics"]["error_rms_x"]
-    rigs = [env.simulation.plant.lane_parameters for env in made]
-    np.testing.assert_array_equal(rigs[0], rigs[1])
-    assert len(np.unique(rigs[0], axis=1).T) == (3 if PLANTS[plant] is True else 1)
-    for world in ([*env.simulation.reference.rows, *env.simulation.force] for env in made[1:]):
-        np.testing.assert_array_equal(world, [*made[0].simulation.reference.rows, *made[0].simulation.force])
-    assert len(np.unique(made[0].simulation.reference.rows, axis=1).T) == 3
 
 
 def test_settings_tell_a_file_from_its_next_version_and_controllers_have_files_of_their_own(tmp_path):

@@ -14,13 +14,7 @@ from birthsim_env.physics.geometry import inverse_geometry, joint_force
 from birthsim_env.physics.plant import Plant
 from studies.comparison import stiffness as studies
 from studies.comparison import stiffness_figures as study_figures
-from studies.comparison.stiffness import (
-    disturbance_study,
-    ellipse_study,
-    frictionless,
-    polar_study,
-    stiffness_study,
-)
+from studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study
 
 RIG = Parameters()
 SMOOTH = frictionless(RIG)

@@ -13,7 +13,6 @@ from baselines.commands.figure4 import FIELDS, figures_of, record_run
 from baselines.figures import runs as figures
 from baselines.figures.runs import error_over_time
 from birthsim_env import Parameters
-from tests.bench.test_evaluation import Slam, run
 from tests.console import assert_picture, call, strict
 
 RIG = Parameters()
@@ -122,17 +121,6 @@ def test_the_command_writes_its_figures_the_picture_and_the_numbers(command):
     assert max(numbers["pneumatic_rms_percent"]) < 3
     table = {words[0]: words[1:] for words in map(str.split, printed.splitlines()) if words}
     assert table["settled_rms_mm_at_2000"] == [f"{value:.3f}" for value in numbers["settled_rms_mm_at_2000"]]
-
-
-def test_the_error_over_time_is_drawn_even_if_every_lane_is_lost(tmp_path):
-    kept, lost = run(Slam(lanes=()), "kept"), run(Slam(lanes=(0, 1, 2)), "lost")
-    assert lost.lost == [True] * 3
-    error_over_time([kept, lost], "some lost", tmp_path)
-    assert_picture(tmp_path, "error_over_time")
-    some = (tmp_path / "error_over_time.svg").read_text()
-    error_over_time([lost], "all lost", tmp_path)
-    assert_picture(tmp_path, "error_over_time")
-    assert (tmp_path / "error_over_time.svg").read_text() != some
 
 
 def test_the_error_over_time_shows_the_median_of_every_controller_in_a_style_of_its_own(tmp_path, monkeypatch):

@@ -178,6 +178,7 @@ TABLE = {
         ),
     ],
     ("mechanics.mas", "mass"): [env(randomize={"mechanics.mas": (2, 5)})],
+    ("policy_period = 0.01", "control period 0.004 s"): [env(parameters={"electronics": {"control_period": 0.004}})],
     ("motor", "mechanics"): [env(randomize={"motor.mass": (2, 5)})],
     ("did you mean 'mechanics.mass'?", "mechanics"): [env(randomize={"mass": (2, 5)})],
     ("did you mean 'cylinder1.stroke' or 'cylinder2.stroke'?", ""): [env(randomize={"stroke": (1, 2)})],
