@@ -9,7 +9,6 @@ import pytest
 from baselines.admittance import knowledge
 from baselines.admittance.knowledge import BELIEVED_LIMIT
 from baselines.admittance.rows import Known, Memory
-from baselines.controller import require_stiffness
 from baselines.estimation.admittance import MOVING_SPEED
 from baselines.rivals.horizon import NODES, Horizon, Situation
 from baselines.rivals.predictive import GENERATED as GENERATED
@@ -47,7 +46,7 @@ def inform(world: int, seen: Seen, memory: int, about: Constants, tables: int, l
 
 
 class Aware(StagedController):
-    """What a planner knows, by its names, which are good until the next ``update``; gains for ``ideal`` and ``lab`` sensors."""
+    """What a planner knows, by its names, which are good until the next ``now``; gains for ``ideal`` and ``lab`` sensors."""
 
     def __init__(self, rig: Parameters, gains: dict[str, dict[str, float]], horizon: Horizon = EVERY_PERIOD) -> None:
         super().__init__(rig)
@@ -63,13 +62,6 @@ class Aware(StagedController):
         self.known = Known(np.zeros((Known.size, lanes)))
         return [(self.known.rows, HANDED)]
 
-    def explain(self, measurement: Measurement, reference: Reference) -> None:
-        require_stiffness(reference, 0.0)
-
-    def update(self, measurement: Measurement, reference: Reference) -> None:
-        if self.run_stages(measurement, reference):
-            self.explain(measurement, reference)
-
     @property
     def memory(self) -> Memory:
         return Memory(self._memories[0])
@@ -83,7 +75,7 @@ class Aware(StagedController):
         return given
 
     def now(self, measurement: Measurement, reference: Reference) -> SimpleNamespace:
-        self.update(measurement, reference)
+        assert not self.run_stages(measurement, reference)
         given, memory = self.known.given, self.memory
         return SimpleNamespace(
             motion=self.known.motion.rows, moving=given.moving, force=given.force, believed=given.believed,
