@@ -175,9 +175,9 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
         assert admittance_law.lead(sign, -sign, np.exp(-PERIOD / 0.004), 0.5) == sign
 
 
-def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35, most: float = 1.0) -> Array:
+def watched(errors: Array, fall: float = 0.9, most: float = 1.0) -> Array:
     """The gain fraction after each of the speed errors (T,), one per period."""
-    gains = Gains(Gains.lane(oscillation=level, yielding=fall, least_fraction=least, most_falls=most))
+    gains = Gains(Gains.lane(oscillation=0.06, yielding=fall, least_fraction=0.35, most_falls=most))
     one = remembered(1).follower.along
     return np.array([admittance_law.watch(one, 0, float(error), PERIOD, gains) for error in errors])
 
@@ -187,7 +187,7 @@ TIMES = PERIOD * np.arange(2000)
 
 @pytest.mark.parametrize("frequency", [4.0, 12.0, 40.0])
 def test_sustained_oscillation_lowers_the_gain_down_to_the_least(frequency: float) -> None:
-    """By ``fall`` at each half wave after the second one, never below ``least``."""
+    """By 0.9 at each half wave after the second one, never below 0.35."""
     fraction = watched(0.1 * np.sin(2 * np.pi * frequency * TIMES))
     falls = np.round(np.log(fraction) / np.log(0.9), 9)
     half_waves = np.floor(2 * frequency * TIMES - 1e-9)

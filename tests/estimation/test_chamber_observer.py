@@ -1,7 +1,6 @@
 """The observer of spools and chamber pressures: against exact lags, closed forms, and (6) integrated by SciPy."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -46,9 +45,9 @@ class Observer:
         return self._chambers.pressure
 
 
-def resting(lanes: int, y1: float = 0.02, y2: float = -0.05) -> Array:
+def resting(lanes: int) -> Array:
     """Joints (4, N) of pistons that do not move."""
-    return np.repeat([[y1], [y2], [0.0], [0.0]], lanes, axis=1)
+    return np.repeat([[0.02], [-0.05], [0.0], [0.0]], lanes, axis=1)
 
 
 def swinging(time: float) -> Array:
@@ -104,16 +103,6 @@ def truth(rig: Parameters, openings: Array, times: Array) -> tuple[Array, Array]
     return np.array(found)[:, :4], np.array(found)[:, 4:]
 
 
-def believed(estimator: Observer, openings: Array, times: Array, measured: Callable[[int], Array]) -> Array:
-    """Spools and pressures (T, 8) of one rig that swings while its valves are told ``openings``."""
-    path, joints = [], np.zeros((4, 1))
-    for tick, time in enumerate(times):
-        pressures = estimator.update(measured(tick), joints)
-        path.append(np.concatenate([estimator.spools[:, 0], pressures[:, 0]]))
-        joints, estimator.openings[:, 0] = swinging(time)[:, None], openings[int(time / HOLD + 1e-6)]
-    return np.array(path)
-
-
 @pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
 def test_what_was_commanded_tells_spools_and_pressures(rig: Parameters) -> None:
     """Blind but for the first instant, 0.16 s of swings and strokes of the valves: spools exactly, pressures but for what
@@ -122,9 +111,12 @@ def test_what_was_commanded_tells_spools_and_pressures(rig: Parameters) -> None:
     for period in (1e-3, 5e-4):
         times = period * np.arange(round(20 * HOLD / period))
         spools, pressures = truth(rig, openings, times)
-        path = believed(Observer(rig, BLIND, period=period), openings, times, lambda tick: START)
-        np.testing.assert_allclose(path[:, :4], spools, rtol=0, atol=1e-12)
-        errors.append(np.abs(path[:, 4:] - pressures).max(axis=0))
+        estimator, found, joints = Observer(rig, BLIND, period=period), [], np.zeros((4, 1))
+        for time, spool in zip(times, spools, strict=True):
+            found.append(estimator.update(START, joints)[:, 0].copy())
+            np.testing.assert_allclose(estimator.spools[:, 0], spool, rtol=0, atol=1e-12)
+            joints, estimator.openings[:, 0] = swinging(time)[:, None], openings[int(time / HOLD + 1e-6)]
+        errors.append(np.abs(found - pressures).max(axis=0))
     assert np.ptp(pressures, axis=0).min() > 4e4, "there must be something to predict"
     assert np.all(errors[0] < 0.03 * np.ptp(pressures, axis=0))
     np.testing.assert_allclose(errors[1] / errors[0], 0.5, rtol=0, atol=0.06)
@@ -168,16 +160,10 @@ def test_noise_of_the_cells_is_averaged(bandwidth: float, period: float) -> None
     assert np.abs(np.corrcoef(error[-1]) - np.eye(4)).max() < 0.15
 
 
-def wild(lanes: int, ticks: int) -> tuple[Array, Array, Array]:
-    """Pressures and openings (T, 4, N) and joints (T, 4, N) without a physical meaning."""
-    rng = np.random.default_rng(5)
-    spread = np.array([[0.09], [0.19], [1.0], [1.0]])
-    measured, openings = rng.uniform(0.5e5, 9e5, (ticks, 4, lanes)), rng.uniform(-1, 1, (ticks, 4, lanes))
-    return measured, openings, spread * rng.uniform(-1, 1, (ticks, 4, lanes))
-
-
 def test_exact_cells_are_believed_bit_for_bit() -> None:
-    measured, openings, joints = wild(5, 20)
+    rng = np.random.default_rng(5)
+    measured, openings = rng.uniform(0.5e5, 9e5, (20, 4, 5)), rng.uniform(-1, 1, (20, 4, 5))
+    joints = np.array([[0.09], [0.19], [1.0], [1.0]]) * rng.uniform(-1, 1, (20, 4, 5))
     estimator = Observer(Parameters(), math.inf, 5)
     for pressures, opening, now in zip(measured, openings, joints, strict=True):
         assert np.array_equal(estimator.update(pressures, now), pressures)

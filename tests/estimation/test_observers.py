@@ -9,6 +9,7 @@ from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import linkage_by_points as by_points
@@ -74,23 +75,16 @@ def test_constant_speed_is_found_without_bias(rate: float, latency: float) -> No
             np.testing.assert_allclose(estimate[2:, 0], [0, 0.05], rtol=0, atol=1e-7)
 
 
-def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], Reference]:
-    """50 mm in 4 s."""
-    return lambda time: closed_loop.circling(time, 0.05, 4.0, stiffness, lanes)
+def watched(rig: Parameters, lanes: int, seconds: float) -> Iterator[tuple[float, Plant, Measurement]]:
+    """Time, a rig that goes 50 mm about in 4 s under exact measurements, and the tracker's view of it."""
 
+    def reference(time: float) -> Reference:
+        return closed_loop.circling(time, 0.05, 4.0, 2000.0, lanes)
 
-def watched(rig: Parameters, lanes: int, seconds: float) -> dict[str, Array]:
-    """A rig on the circle under exact measurements, while an observer watches through the tracker: (T, 2, N) after 1 s."""
-    reference, estimator, sense = circle(lanes), Sampled(rig), closed_loop.tracker(rig, lanes)
-    plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
-    speed, piston_error, speed_error = [], [], []
+    plant, sense = closed_loop.resting_at(reference(0.0), rig), closed_loop.tracker(rig, lanes)
+    law = BacksteppingController(rig, weight_compensation=True)
     for time, _, push, _ in closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds):
-        estimate = estimator.update(sense(plant, time, push))
-        if time > 1:
-            speed.append(plant.piston_speed)
-            piston_error.append(estimate[:2] - plant.piston)
-            speed_error.append(estimate[2:] - plant.piston_speed)
-    return {"speed": np.array(speed), "piston error": np.array(piston_error), "speed error": np.array(speed_error)}
+        yield time, plant, sense(plant, time, push)
 
 
 def rms(values: Array) -> Array:
@@ -111,24 +105,21 @@ def test_position_and_speed_of_a_moving_rig(rig: Parameters, position: tuple[flo
     Measured: 0.039 and 0.094 mm, 2.2 and 5.2 mm/s without friction; 0.043 and 0.166 mm, 3.5 and 19 mm/s with LuGre friction,
     which the observer does not know and finds anew at every reversal.
     """
-    seen = watched(rig, 8, 5.0)
-    assert np.all(rms(seen["piston error"]) < position)
-    assert np.all(rms(seen["speed error"]) < speed)
-    assert np.abs(seen["piston error"].mean(axis=(0, 2))).max() < 1e-5, "no offset"
-
-
-def recorded(lanes: int, seconds: float) -> list[Measurement]:
-    """Measurements of a rig on the circle through the tracker."""
-    rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), closed_loop.tracker(closed_loop.FRICTIONLESS, lanes)
-    plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
-    path = closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds)
-    return [sense(plant, time, push) for time, _, push, _ in path]
+    estimator, errors = Sampled(rig), []
+    for time, plant, measured in watched(rig, 8, 5.0):
+        estimate = estimator.update(measured)
+        if time > 1:
+            errors.append(estimate - np.concatenate([plant.piston, plant.piston_speed]))
+    error = np.array(errors)
+    assert np.all(rms(error[:, :2]) < position)
+    assert np.all(rms(error[:, 2:]) < speed)
+    assert np.abs(error[:, :2].mean(axis=(0, 2))).max() < 1e-5, "no offset"
 
 
 def test_an_observer_starts_from_what_the_tracker_shows() -> None:
     """Position and speed; 0.6 s later nothing is left of when it began."""
     kept, late = Sampled(closed_loop.FRICTIONLESS), Sampled(closed_loop.FRICTIONLESS)
-    for tick, measured in enumerate(recorded(1, 1.2)):
+    for tick, (_, _, measured) in enumerate(watched(closed_loop.FRICTIONLESS, 1, 1.2)):
         expected = kept.update(measured).copy()
         if tick >= 600:
             got = late.update(measured).copy()
