@@ -37,17 +37,14 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pyte
     verdict = judge(Cases([RIG, RIG], np.array([0.0, 30000.0]), np.full(2, 2000.0)), make_controller(f"{own}:Out", RIG))
     assert verdict.lost.tolist() == [True, False]
     assert not verdict.stable[0]
-    monkeypatch.setitem(MAPS, "hand", Map("pushed out", *small_axes(), MAPS["hand"].cases, lambda rig: (None, None)))
+    hand, asked = Axis("hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
+    monkeypatch.setitem(MAPS, "hand", Map("pushed out", hand, asked, MAPS["hand"].cases, lambda rig: (None, None)))
     (((key, label), task),) = stability_tasks(["hand"], controller_settings(f"{own}:Out", RIG), "ideal", None, 0).items()
     assert label == f"{own}:Out"
     chart = {**describe_map(key, RIG), "variants": {label: task.work(**task.settings)}}
     assert np.isnan(chart["variants"][f"{own}:Out"]["motion_mm"][0][0])
     stability_figure("own", chart, "with a file of one's own", tmp_path)
     assert "lost: ran into a stop" in "".join(re.findall("<!-- (.*?) -->", (tmp_path / "stability_own.svg").read_text()))
-
-
-def small_axes() -> tuple[Axis, Axis]:
-    return Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
 
 
 def test_how_far_all_is_stable() -> None:

@@ -17,10 +17,6 @@ def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
     return env
 
 
-def single(name=CIRCLE, **arguments):
-    return gymnasium.make(name, **arguments).unwrapped
-
-
 def random_actions(steps, lanes, size=4, reach=0.3, seed=0):
     return np.random.default_rng(seed).uniform(-reach, reach, (steps, lanes, size)).astype(np.float32)
 
