@@ -7,8 +7,19 @@ import pytest
 from tests.build.targets import need_linker
 from tests.console import OWN, RESIDUAL, assert_says, call, words
 
+TUNED = """
+class Tuned(Held):
+    TUNABLE = {"fraction": (0.0, 2.0)}
+
+class Upside(Held):
+    TUNABLE = {"fraction": (5.0, 1.0)}
+
+class Mute(Held):
+    TUNABLE = {}
+"""
 FILES = {
-    "own/mine.txt": "mine", "heavy.toml": "[mechanics]\nmass = 90.0\n", "rig.toml": "[mechanics]\nmass = -3.0\n", "own.py": OWN,
+    "own/mine.txt": "mine", "heavy.toml": "[mechanics]\nmass = 90.0\n", "rig.toml": "[mechanics]\nmass = -3.0\n",
+    "own.py": OWN + TUNED, "other.json": '{"gains": {"damping": 1.0}}', "beyond.json": '{"gains": {"fraction": 2.5}}',
 }  # fmt: skip
 """What lies in the folder where a command is called."""
 ONE_OF = "allowed: one of LOG, --propose PLAN, --simulate PLAN"
@@ -107,6 +118,16 @@ TABLE = {
     "train --randomize some --out x": ("--randomize", *DRAWN),
     "train --parameters rig.toml --out x": MASS,
     "train --out own.py": "own.py' is a file; allowed: a folder",
+    "tune --controller backstepping --out x": "controller = 'backstepping' has no gains to tune; allowed: ",
+    "tune --controller own.py:Mute --out x": "has no gains to tune",
+    "tune --controller own.py:Upside --out x": "Upside.TUNABLE['fraction'] = (5.0, 1.0); allowed: 0 <= low < high, finite",
+    "tune --controller nobody --out x": f"controller = 'nobody'; {KNOWN}",
+    "tune --controller pid --trials 0 --out x": ("--trials", "'0'", "a whole number from 1 to 100000"),
+    "tune --controller pid --sensors none --out x": ("--sensors", "none", "ideal", "both"),
+    "tune --controller pid --start nowhere.json --out x": "nowhere.json'",
+    "tune --controller pid --start other.json --out x": "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
+    "tune --controller own.py:Tuned --start beyond.json --out x": "beyond.json' has fraction = 2.5; allowed: 0 to 2",
+    "tune --controller pid --parameters nowhere.toml --out x": "'nowhere.toml'",
     "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
     "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to fmux": "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help",
