@@ -101,6 +101,21 @@ TABLE = {
         (PYTHON, ":Needs", "user_force: Needs() fails (TypeError: ", "'size'); allowed: a birthsim_env.UserForce"),
         (PYTHON, ":number", "user_force = 3; allowed: None, a birthsim_env.UserForce, 'steps', 'sine'"),
     ],
+    ("user_force", "push.csv"): [
+        (text, names, "user_force = ", said, "allowed: ")
+        for text, names, said in (
+            ("time_ms,Fx,Fy\n0,1,2\n1,1,2\n", "", "'time'"),
+            ("time (ms),Fx,Fy\n0,1,2\n1,1,2\n", "", "'time' in ms, not in s"),
+            ("time,Fx [kN],Fy\n0,1,2\n1,1,2\n", "", "'Fx' in kN, not in N"),
+            ("time,Fx,Fx,Fy\n0,1,2,3\n1,1,2,3\n", "", "'Fx' 2 times"),
+            ("time;Fx;Fy\n0;1;2\n1;1;2\n", "", "separated by commas"),
+            ("t,a,b\n0,1,2\n1,1,2\n", ":t,a", "one for each of"),
+            ("t,a,b\n0,1,2\n1,1,2\n", ":t,a,d", "'d' 0 times"),
+            ("0,1,2\n1,1,2\n", ":t,a,b", "t, a, b"),
+            ("time,Fx,Fy\n0,1,2\n1,1\n", "", "line 3"),
+            ("Fx,time,Fy\n0,1,2\n1,0.5,2\n", "", "line 3"),
+        )
+    ],
     ("user_force", "soft"): [(None, "", "soft'; allowed: a birthsim_env.UserForce, 'steps', 'sine', 'noise', 'guided'")],
     ("stiffness", "own.csv"): [
         (text, "", "stiffness") for text in ("0,0.5,0\n1,0.5,0\n", "0,0.5,0,2000\n1,0.5,0\n", "0,0.5,0,-1\n1,0.5,0,2000\n")

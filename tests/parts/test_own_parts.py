@@ -132,29 +132,6 @@ def test_a_heading_names_the_columns_in_any_order(text, names, tmp_path):
     np.testing.assert_array_equal(found, [[0.0, 1.0, -2.0], [1.0, 3.0, -4.0]])
 
 
-WRONG = {
-    "milliseconds": ("time_ms,Fx,Fy\n0,1,2\n1,1,2\n", "", "'time'"),
-    "another unit": ("time (ms),Fx,Fy\n0,1,2\n1,1,2\n", "", "'time' in ms, not in s"),
-    "kilonewtons": ("time,Fx [kN],Fy\n0,1,2\n1,1,2\n", "", "'Fx' in kN, not in N"),
-    "twice": ("time,Fx,Fx,Fy\n0,1,2,3\n1,1,2,3\n", "", "'Fx' 2 times"),
-    "semicolons": ("time;Fx;Fy\n0;1;2\n1;1;2\n", "", "separated by commas"),
-    "too few names": ("t,a,b\n0,1,2\n1,1,2\n", ":t,a", "one for each of"),
-    "a name that is not there": ("t,a,b\n0,1,2\n1,1,2\n", ":t,a,d", "'d' 0 times"),
-    "names without a heading": ("0,1,2\n1,1,2\n", ":t,a,b", "t, a, b"),
-    "a short line": ("time,Fx,Fy\n0,1,2\n1,1\n", "", "line 3"),
-    "time that goes back": ("Fx,time,Fy\n0,1,2\n1,0.5,2\n", "", "line 3"),
-}
-
-
-@pytest.mark.parametrize(("text", "names", "allowed"), WRONG.values(), ids=WRONG)
-def test_what_a_file_does_not_say_is_refused(text, names, allowed, tmp_path):
-    (tmp_path / "push.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match="user_force = ") as caught:
-        columns("user_force", csv_file(f"{tmp_path}/push.csv{names}"), FORCE, tuple(FORCE))
-    assert allowed in str(caught.value)
-    assert "allowed: " in str(caught.value)
-
-
 def test_a_stiffness_needs_no_course_beside_it_once_it_is_named(tmp_path):
     (tmp_path / "own.csv").write_text("stiffness,time\n1000,0\n2000,1\n", encoding="utf-8")
     file = csv_file(tmp_path / "own.csv")

@@ -71,12 +71,6 @@ def test_without_a_force_sensor_no_law_that_reads_one_runs_beside(monkeypatch, c
     assert "force_sensor = False with law = 'admittance-adaptive'" in complained
 
 
-def test_no_policy_is_one_line(monkeypatch, capsys, tmp_path):
-    status, _, complained = call("beside-law", monkeypatch, capsys, "--policy", tmp_path, "--out", tmp_path / "out")
-    assert status == 2
-    assert len(complained.strip().splitlines()) == 1
-
-
 @pytest.mark.slow
 def test_a_policy_stands_beside_its_controller_under_a_moving_hand(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(own_motion, "HANDS", ("guided",))
