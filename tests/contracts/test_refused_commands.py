@@ -32,6 +32,8 @@ TABLE = {
     "export --to cortex-m7 --env BirthSIM/Circle-v1 --out x": "--env with cortex-m7; allowed: without it",
     "export --to wasm --parameters nowhere.toml --out x": "'nowhere.toml'",
     "export --to ptx --gpu sm_90 --out x": "--gpu with ptx; allowed: with cubin",
+    "export --to parquet own.py --out a.csv": "a.csv'; allowed: a file that ends in .parquet",
+    "export --to mcap none.rec --out a.mcap": "none.rec' cannot be read",
     "export --to fmu --out x.zip": "--out 'x.zip'; allowed: a file that ends in .fmu",
     "export --to fmu --controller shut-valves --out x.fmu": f"controller = 'shut-valves'; {COMPILED},",
     "export --to fmu --controller pid --policy circle --out x.fmu": "--controller with --policy; allowed: one of them",

@@ -1,5 +1,7 @@
 """Files of a user's own that are refused: one line that names what is wrong and what is allowed."""
 
+from pathlib import Path
+
 import gymnasium
 import pytest
 
@@ -9,6 +11,7 @@ from baselines.logs.table import read_table
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.own_parts import stiffness_of
+from birthsim_live.logs.reading import read_log
 
 CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()
@@ -28,6 +31,7 @@ READERS = {
     "training": load_configuration,
     "plan": lambda path: read_plan(path, RIG),
     "log": read_table,
+    "recorded": lambda path: read_log(Path(path)),
 }
 
 PYTHON = """
@@ -164,6 +168,15 @@ TABLE = {
         ("time,a\n0,1\n1\n", "", "line 3: '1'; allowed: 2 numbers, for time, a"),
         ("time,a,a\n0,1,2\n", "", "has two columns 'a'; allowed: one of each name"),
         ("time,a\n" + "1," * 2**20, "", "log.csv'", " allowed: at most 1048576"),
+    ],
+    ("recorded", "bad.rec"): [
+        (None, "", "bad.rec' cannot be read"),
+        ("{", "", "bad.rec' is damaged or foreign (no chunk is whole)"),
+    ],
+    ("recorded", "bad.json"): [
+        (None, "", "bad.json' cannot be read"),
+        ("{", "", "bad.json' is damaged or foreign (JSONDecodeError"),
+        ("[1]", "", "bad.json' is damaged or foreign (TypeError"),
     ],
     ("log", "log.parquet"): [(b"PAR1 but not", "", "is no Parquet (")],
     ("log", "log.mcap"): [(b"neither", "", "cannot be read as MCAP (")],
