@@ -14,7 +14,7 @@ import pytest
 from baselines.bench.evaluation import evaluate
 from baselines.controller import PlainLaw
 from baselines.registry import make_controller
-from birthsim_build.device import episodes, machine
+from birthsim_build.device import machine
 from birthsim_build.device.evaluation import evaluate_on
 from birthsim_env import ForceProfile, Parameters, StiffnessSchedule
 from birthsim_env.parts.references import Trajectory
@@ -71,9 +71,7 @@ def assert_same_run(here, there, steps, **options):
 @pytest.mark.slow
 @pytest.mark.parametrize(("mode", "staggered"), [("NextStep", False), ("NextStep", True), ("SameStep", True)])
 @pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v1", "honest"), (RESIDUAL, "lab")])
-def test_the_bits_of_the_native_environment(monkeypatch, mode, staggered, name, sensors):
-    # Lanes begin in groups of this size, the last of them smaller.
-    monkeypatch.setattr(episodes, "TOGETHER", 3)
+def test_the_bits_of_the_native_environment(mode, staggered, name, sensors):
     shared = {"sensors": sensors, "autoreset_mode": mode, "max_episode_steps": 4}
     assert_same_run(made(None, name, **shared), made("host", name, **shared), 11, staggered=staggered)
 
@@ -89,20 +87,6 @@ def test_lanes_that_wait_begin_where_they_are_told():
             env.step(np.zeros((7, 4)))
     outcomes = [env.reset(options={"reset_mask": mask | (np.arange(7) > 3), "position": (0.51, 0.01)}) for env in envs]
     assert_equal(np.delete(outcomes[0][0], 2, axis=0), np.delete(outcomes[1][0], 2, axis=0))  # lane 2 drew its own seed
-
-
-class Taps(ForceProfile):
-    """A user's hand that is compiled, with a number of knots of its own in every episode."""
-
-    def knots(self, rng):
-        return [(0.0, 0.0, 0.0), *((0.01 * k, rng.uniform(-20, 20), 0.0) for k in range(1, rng.integers(2, 30)))]
-
-
-@pytest.mark.slow
-def test_a_table_gets_room_for_more(monkeypatch):
-    monkeypatch.setattr(episodes, "TOGETHER", 2)
-    shared = {"user_force": Taps(), "max_episode_steps": 3}
-    assert_same_run(made(None, **shared), made("host", **shared), 13)
 
 
 @pytest.mark.slow
@@ -178,11 +162,12 @@ def law(name="admittance-backstepping"):
 def test_an_evaluation_measures_the_same(lanes, world):
     shared = {"sensors": "lab", "randomize": True, "duration": 0.6, **world}
     here = evaluate(CIRCLE, law(), "law", lanes, SEED, False, **copy.deepcopy(shared))
-    there = evaluate_on("host", CIRCLE, law(), "law", lanes, SEED, **copy.deepcopy(shared))
+    there = evaluate_on("host", CIRCLE, law(), "law", lanes, SEED, False, **copy.deepcopy(shared))
     # JSON writes every bit of a number, and NaN as NaN.
     assert json.dumps(here.to_dict()) == json.dumps(there.to_dict())
     assert_equal(np.concatenate(here.traces, axis=1), np.concatenate(there.traces, axis=1))
     assert bool(world) == (0 < sum(here.lost) < lanes)
+    assert 0.0 < there.cost < 1e6
 
 
 class Still(Trajectory):
@@ -199,6 +184,8 @@ def test_what_no_device_does_is_refused_by_name(monkeypatch):
         made("host", reference=Still())
     with pytest.raises(ValueError, match=r"controller = Asleep, in Python; allowed on a device: what is compiled"):
         evaluate_on("host", CIRCLE, Asleep(lambda measurement, reference: 0.0), "asleep", 2, SEED)
+    with pytest.raises(ValueError, match=r"device = 'cuda'; allowed: None; birthsim_build\.device\.evaluation\.evaluate_on"):
+        evaluate(CIRCLE, law(), "law", 2, SEED, device="cuda")
     with pytest.raises(ValueError, match=r"device = 'gpu'; allowed: None, 'host', 'cuda'"):
         made("gpu")
     with pytest.raises(ValueError, match=r"render_mode, with a device, = 'rgb_array'; allowed: None"):
@@ -263,7 +250,7 @@ def test_what_is_asked_of_cupy(monkeypatch, mode):
     def there_by(made):
         return lambda *given, **named: made(*given, **named).view(There)
 
-    alike = (np.zeros, np.asarray, np.array, np.arange, np.argwhere, np.clip)
+    alike = (np.zeros, np.asarray, np.arange, np.argwhere, np.clip, np.flatnonzero, np.concatenate)
     cupy = types.SimpleNamespace(**{made.__name__: there_by(made) for made in alike}, asnumpy=np.array)
     cupy.RawModule = lambda path: types.SimpleNamespace(get_function=lambda name: RawKernel(path, name))
     cupy.cuda = types.SimpleNamespace(runtime=types.SimpleNamespace(getDeviceCount=lambda: 1))

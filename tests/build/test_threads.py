@@ -24,7 +24,7 @@ from birthsim_env.parts.sensors.sensors import SENSORS
 from tests.build.targets import assert_fusing_changes_nothing, fill, need_threads
 
 SEED = 2_000_000
-WAY = "birthsim_env.parts.references:_path_stage"
+WAY = "birthsim_env.parts.references:_path"
 LOOKS = {"baselines.bench.measures:_see", "baselines.bench.measures:_pay"}
 """What measures an evaluation."""
 

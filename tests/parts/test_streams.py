@@ -13,7 +13,6 @@ from birthsim_env.parts import courses
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.drawn.streams import TOGETHER, Streams, begin, worlds
-from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
@@ -82,12 +81,16 @@ RANGES = {
 }  # fmt: skip
 
 
+PAST = ("_state", "impacts", "_queue", "_shown", "_arrived", "_passed", "_late", "_readings")
+"""What looking leaves."""
+
+
 def arrays(simulation: Simulation):
     """Everything that a new episode draws, per part."""
     parts = (simulation.plant, simulation.trajectory, simulation.user_force, simulation.stiffness, simulation.sensors)
     for part in parts:
         for name, value in vars(part).items():
-            if isinstance(value, np.ndarray) and name not in ("_state", "impacts", "_queue", "_shown", "_arrived"):
+            if isinstance(value, np.ndarray) and name not in PAST:
                 yield f"{type(part).__name__}.{name}", value
 
 
@@ -95,8 +98,8 @@ def begin_one_by_one(simulation: Simulation, lanes, seeds, episodes):
     """As it was before lanes began together, with NumPy's generators."""
     for lane in lanes:
         world = {name: stream(seeds[lane], int(episodes[lane]), name) for name in STREAMS}
-        if simulation._ranges:
-            drawn = draw_parameters(simulation.parameters, simulation._ranges, world["parameters"])
+        if simulation.ranges:
+            drawn = draw_parameters(simulation.parameters, simulation.ranges, world["parameters"])
             simulation.plant.lane_parameters[:, lane] = parameter_column(drawn)
         simulation.trajectory.begin(lane, world["reference"])
         simulation.user_force.begin(lane, world["user_force"])
@@ -170,7 +173,7 @@ def test_a_users_own_begin_is_called_lane_by_lane_with_numpys_generator():
         assert own._own[2, lane] == radius + rng.normal()
 
 
-@pytest.mark.parametrize("base", [ForceProfile, Ramp, Contractions])
+@pytest.mark.parametrize("base", [ForceProfile, Ramp])
 def test_a_users_own_knots_are_drawn_lane_by_lane(base):
     class Own(base):
         def knots(self, rng):
