@@ -31,8 +31,8 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
     numbers, to the last bit, as a single environment with its seed. ``max_episode_steps`` shortens episodes.
 
     With ``device="cuda"`` the lanes live on an NVIDIA GPU, with the same bits, and so do all arrays that are returned. They are
-    CuPy's, which PyTorch and JAX take by DLPack without a copy. Actions may be NumPy's, or be there. New episodes are drawn on
-    this processor and copied there. ``device="host"`` runs a GPU's code on this processor.
+    CuPy's, which PyTorch and JAX take by DLPack without a copy. Actions may be NumPy's, or be there. New episodes are drawn
+    there too, so that a part of a user's own may not draw in Python. ``device="host"`` runs a GPU's code on this processor.
 
     ``autoreset_mode`` says what happens to a lane that ends, as in Gymnasium (``AutoresetMode`` or its value):
     - ``NEXT_STEP`` (default): the next step ignores its action and returns the first observation of its new episode, reward 0;

@@ -250,7 +250,7 @@ def test_what_is_asked_of_cupy(monkeypatch, mode):
     def there_by(made):
         return lambda *given, **named: made(*given, **named).view(There)
 
-    alike = (np.zeros, np.asarray, np.arange, np.argwhere, np.clip, np.flatnonzero, np.concatenate)
+    alike = (np.zeros, np.asarray, np.array, np.arange, np.argwhere, np.clip, np.flatnonzero, np.concatenate)
     cupy = types.SimpleNamespace(**{made.__name__: there_by(made) for made in alike}, asnumpy=np.array)
     cupy.RawModule = lambda path: types.SimpleNamespace(get_function=lambda name: RawKernel(path, name))
     cupy.cuda = types.SimpleNamespace(runtime=types.SimpleNamespace(getDeviceCount=lambda: 1))
