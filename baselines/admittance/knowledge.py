@@ -114,7 +114,7 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         moving = Moving(seen.rows[place : place + Moving.size])
         inertial_force.observe(memory.hand, memory.hold, seen.time, moving, joints, pressures, belief.rig, belief.period, fresh)
     elif about.force_sensor == 0.0:
-        force_observer.observe(memory.hand, seen.time, joints, known.unexplained, belief.rig, belief.period, fresh)
+        force_observer.observe(memory.hand, seen, memory.pistons, joints, memory.chambers.pressure, known.given.noise, belief, fresh)
 
 
 @helper

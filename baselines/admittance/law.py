@@ -14,8 +14,9 @@ with the forces unseen of ``knowledge``: believed friction and what an observer 
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
-from baselines.admittance.rows import Gains, HalfWave, Known, Memory, Watch
+from baselines.admittance.rows import Gains, Known, Memory, Watch
 from baselines.backstepping.cartesian_law import across, along, load_rates
+from baselines.estimation.half_wave import sustained
 from baselines.estimation.rows import Belief
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
@@ -29,31 +30,6 @@ MOTION_TIME = 0.1
 MOST_ERROR = 0.006
 """m; assumed: no position error counts for more. A larger one, left by a load beyond what the cylinders can hold, is closed at
 a speed of c MOST_ERROR/3, which saturated valves can still stop; else the loop swings between its limits."""
-
-HALF_WAVE = 0.2
-"""s: a longer half wave of the speed error is no oscillation of the loop."""
-
-SUSTAINED = 0.75
-"""A half wave of at least this fraction of the one before is sustained; a transient dies faster."""
-
-
-@helper
-def sustained(wave: HalfWave, i: int, error: float, period: float, level: float, before: float) -> float:
-    """Size of a sustained half wave of a speed error beyond ``level`` that has just ended, else zero.
-
-    One is sustained where the half wave before it went beyond ``before``.
-    """
-    extreme = wave.extreme[i]
-    wave.since[i] += period
-    if error * extreme < 0.0:
-        peak = abs(extreme) if wave.since[i] < HALF_WAVE else 0.0
-        last = wave.peak[i]
-        wave.extreme[i], wave.since[i], wave.peak[i] = error, 0.0, peak
-        return peak if peak > level and last > before and peak > SUSTAINED * last else 0.0
-    if abs(error) > abs(extreme):
-        wave.extreme[i] = error
-    return 0.0
-
 
 @helper
 def watch(watched: Watch, i: int, error: float, period: float, gains: Gains) -> float:

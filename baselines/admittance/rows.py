@@ -4,20 +4,13 @@ from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.half_wave import HalfWave
 from baselines.estimation.held_force import Hold
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
-
-
-class HalfWave(Rows):
-    """The half wave of a speed error that is under way, and the one before."""
-
-    extreme = row("m/s", "largest error of this half wave")
-    since = row("s", "since it began")
-    peak = row("m/s", "largest error of the last one")
 
 
 class Watch(HalfWave):
