@@ -40,6 +40,9 @@ HEAVY = 5.0
 gain answers it. With sampled positions and a force sensor, where it learns, a heavier head therefore rests with a gain lower
 by sqrt(HEAVY/mass). At 9 kg it then hunts by 0.6 instead of 1.7 mm. The root was found by trial."""
 
+SWING = 0.015
+"""m/s of the speed error, beyond which a loop that knows the hand by friction alone is calmed at rest; found by trial."""
+
 MOST_BIAS = 2.0
 """assumed: a force sensor's bias is at most so many times that believed."""
 
@@ -137,7 +140,14 @@ class AdmittanceController(StagedController):
             tuned, least, falls = {**tuned, "rest_gain": lighter * tuned["rest_gain"]}, SAMPLED_LEAST, MOST_FALLS
         g = {**tuned, **self._own}
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
-        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, "least_fraction": least, "most_falls": falls, **g}
+        follow = {
+            "pneumatic_gain": PNEUMATIC_GAIN,
+            "quickness": quickness,
+            "least_fraction": least,
+            "most_falls": falls,
+            "swing": 0.0 if inert or self._force_sensor else SWING,
+            **g,
+        }
         about = knowledge.beliefs(
             rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,

@@ -114,7 +114,9 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         moving = Moving(seen.rows[place : place + Moving.size])
         inertial_force.observe(memory.hand, memory.hold, seen.time, moving, joints, pressures, belief.rig, belief.period, fresh)
     elif about.force_sensor == 0.0:
-        force_observer.observe(memory.hand, seen, memory.pistons, joints, memory.chambers.pressure, known.given.noise, belief, fresh)
+        force_observer.observe(
+            memory.hand, seen, memory.pistons, joints, memory.chambers.pressure, known.given.noise, belief, fresh
+        )
 
 
 @helper
@@ -137,7 +139,7 @@ def know(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> int:
 def fresh_memory(rig: Parameters, sampled: bool) -> Array:
     """``Memory`` of a lane that starts."""
     whole, pistons = Watch.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
-    follower = Follower.lane(across=whole, along=whole)
+    follower = Follower.lane(across=whole, along=whole, calm_across=whole, calm_along=whole)
     mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
     return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
 

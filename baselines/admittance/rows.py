@@ -24,6 +24,9 @@ class Follower(Rows):
 
     across = part(Watch, "across cylinder 2")
     along = part(Watch, "along cylinder 2")
+    calm_across = part(Watch, "across cylinder 2, at rest")
+    calm_along = part(Watch, "along cylinder 2, at rest")
+    drift = rows("vx vy", "m/s", "low-passed velocity of the motion")
     moved = row("1", "how far the motion was moving of late, 0 to 1")
 
 
@@ -85,6 +88,7 @@ class Gains(Numbers):
     dead_zone = number("m", "of a resting piston's position error")
     quickness = number("1", "fraction of the way that a spool is taken in a period")
     oscillation = number("m/s", "speed error beyond which sustained half waves lower c")
+    swing = number("m/s", "speed error beyond which sustained half waves lower c at rest for a while; 0: none do")
     yielding = number("1", "what such a half wave leaves of c")
     least_fraction = number("1", "what is left of c at least")
     most_falls = number("1", "times that a half wave lowers c at most: one n times ``oscillation`` lowers it n times")

@@ -1,26 +1,32 @@
 """An extended Kalman filter of one piston: where it is, how far its bristles are bent, and what force acts on it unseen.
 
     y' = v,   v' = w (L + f - Fv v - s0 z - s1 z') + a0,   z' = v - s0 |v| z/G(v),   f' = noise
-with the chambers' force L known from pressures. Position samples correct all four. A resting piston tells f by its bristles,
-20 um for 1 N, so the filter averages for as long as ``PUSH_NOISE`` allows; a sliding one tells it by its acceleration, at once.
+with the chambers' force L known from pressures, the answer w to a force and the acceleration a0 without one. Friction is
+LuGre's. Position samples correct all four. A resting piston reveals f by its bristles, 20 um for 1 N, hence slowly; a sliding
+one by its acceleration. LuGre on an observed speed creeps under its noise; here the model alone moves the bristles at rest.
 """
 
-from baselines.estimation.rows import Belief
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 
-PUSH_NOISE = 3.0
-"""N2/s, density of the noise that drives f; found by trial."""
+PUSH_NOISE, SPEED_NOISE = 3.0, 1e-6
+"""N2/s and m2/s3: densities of the noise that drives f and v; found by trial. At rest f is then averaged over 0.2 s."""
 
 ALERT, EXPECTED, SHARE = 100.0, 2.0, 0.1
+"""Samples that are further off than their noise explains make f noisier: by ``ALERT`` times what their squared innovations,
+averaged with the weight ``SHARE`` and in units of their variance, exceed ``EXPECTED``. Found by trial."""
 
-SPEED_NOISE = 1e-6
-"""m2/s3, density of the noise that drives v."""
+MOST_SURPRISE = 25.0
+"""assumed: no squared innovation counts for more, in units of its variance."""
 
 FIRST_PUSH, FIRST_BRISTLE = 1.0, 2.0
-"""N, standard deviations of f and of s0 z at a start."""
+"""N; assumed: standard deviations of f and of s0 z at a start."""
+
+
+LEAST_FRICTION = 1e-3
+"""N; a piston without friction is believed to have this, so that its bristles bend by a distance."""
 
 
 class Bristled(Rows):
@@ -40,7 +46,20 @@ class Bristled(Rows):
     zz = rows("zz1 zz2", "m2", "covariance")
     zf = rows("zf1 zf2", "N m", "covariance")
     ff = rows("ff1 ff2", "N2", "covariance")
-    surprise = rows("e1 e2", "1", "low-passed square of what samples were off, in units of what was expected")
+    surprise = rows("e1 e2", "1", "squared innovations over their variance, averaged")
+
+
+@helper
+def _slack(speed: float, coulomb: float, static: float, p: Rig) -> float:
+    """Deflection, m, at which a sliding piston's bristles stay."""
+    level: float = max(friction.stribeck_level(speed, coulomb, static, p.stribeck), LEAST_FRICTION) / p.s0
+    return level
+
+
+@helper
+def _way(speed: float) -> float:
+    """1 or -1, in which a piston goes."""
+    return 1.0 if speed > 0.0 else -1.0
 
 
 @helper
@@ -49,29 +68,30 @@ def begin(b: Bristled, k: int, i: int, position: float, push: float, noise: floa
     b.position[k, i], b.speed[k, i], b.bristle[k, i], b.push[k, i] = position, 0.0, 0.0, push
     b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i] = noise * noise, 0.0, 0.0, 0.0
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = 0.0, 0.0, 0.0
-    b.zz[k, i], b.zf[k, i], b.ff[k, i] = (FIRST_BRISTLE / p.s0) ** 2, 0.0, FIRST_PUSH * FIRST_PUSH
+    bent = min(FIRST_BRISTLE, p.fc1 if k == 0 else p.fc2) / p.s0
+    b.zz[k, i], b.zf[k, i], b.ff[k, i] = bent * bent, 0.0, FIRST_PUSH * FIRST_PUSH
     b.surprise[k, i] = 1.0
 
 
 @helper
 def predict(b: Bristled, k: int, i: int, load: float, own: float, answer: float, p: Rig, period: float) -> None:
-    """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without forces; ``answer``,
-    1/kg, to a force."""
+    """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
+    forces; ``answer``, 1/kg, to a force."""
     coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
     viscous = p.fv1 if k == 0 else p.fv2
-    v, z = b.speed[k, i], b.bristle[k, i]
-    slack = max(friction.stribeck_level(v, coulomb, static, p.stribeck), friction.SMALLEST_LEVEL) / p.s0
-    way = 1.0 if v > 0.0 else -1.0
-    bends, relaxes = 1.0 - way * z / slack, abs(v) / slack
-    rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * (v * bends))
+    most = max(static, LEAST_FRICTION) / p.s0
+    v, z = b.speed[k, i], max(-most, min(most, b.bristle[k, i]))
+    slack = _slack(v, coulomb, static, p)
+    kept = 1.0 / (1.0 + period * abs(v) / slack)
+    bends, relaxes = kept * (1.0 - _way(v) * z / slack), kept * abs(v) / slack
+    rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
     step = period * answer
     av, az, af = 1.0 - step * (viscous + p.s1 * bends), -step * (p.s0 - p.s1 * relaxes), step
-    v = v + period * rate
-    slack = max(friction.stribeck_level(v, coulomb, static, p.stribeck), friction.SMALLEST_LEVEL) / p.s0
-    way = 1.0 if v > 0.0 else -1.0
+    v += period * rate
+    slack = _slack(v, coulomb, static, p)
     kept = 1.0 / (1.0 + period * abs(v) / slack)
     z = kept * (z + period * v)
-    bend = period * kept * (1.0 - way * z / slack)
+    bend = period * kept * (1.0 - _way(v) * z / slack)
     bv, bz, bf = bend * av, kept + bend * az, bend * af
     b.position[k, i] += period * v
     b.speed[k, i], b.bristle[k, i] = v, z
@@ -81,11 +101,19 @@ def predict(b: Bristled, k: int, i: int, load: float, own: float, answer: float,
     ay, by = av * yv + az * yz + af * yf, bv * yv + bz * yz + bf * yf
     avv, avz, avf = av * vv + az * vz + af * vf, av * vz + az * zz + af * zf, av * vf + az * zf + af * ff
     bvv, bvz, bvf = bv * vv + bz * vz + bf * vf, bv * vz + bz * zz + bf * zf, bv * vf + bz * zf + bf * ff
-    vv, vz, zz = av * avv + az * avz + af * avf + period * SPEED_NOISE, bv * avv + bz * avz + bf * avf, bv * bvv + bz * bvz + bf * bvf
+    vv, vz, zz = (
+        av * avv + az * avz + af * avf + period * SPEED_NOISE,
+        bv * avv + bz * avz + bf * avf,
+        bv * bvv + bz * bvz + bf * bvf,
+    )
     b.yy[k, i] += period * (2.0 * ay + period * vv)
     b.yv[k, i], b.yz[k, i], b.yf[k, i] = ay + period * vv, by + period * vz, yf + period * avf
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = vv, vz, avf
-    b.zz[k, i], b.zf[k, i], b.ff[k, i] = zz, bvf, ff + period * PUSH_NOISE * (1.0 + ALERT * max(0.0, b.surprise[k, i] - EXPECTED))
+    b.zz[k, i], b.zf[k, i], b.ff[k, i] = (
+        zz,
+        bvf,
+        ff + period * PUSH_NOISE * (1.0 + ALERT * max(0.0, b.surprise[k, i] - EXPECTED)),
+    )
 
 
 @helper
@@ -94,7 +122,7 @@ def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> Non
     yy, yv, yz, yf = b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i]
     weight = 1.0 / (yy + noise * noise)
     e = weight * innovation
-    b.surprise[k, i] += SHARE * (min(e * innovation, 25.0) - b.surprise[k, i])
+    b.surprise[k, i] += SHARE * (min(e * innovation, MOST_SURPRISE) - b.surprise[k, i])
     b.position[k, i] += yy * e
     b.speed[k, i] += yv * e
     b.bristle[k, i] += yz * e

@@ -1,4 +1,7 @@
-"""The hand's force without a force sensor."""
+"""The hand's force without a force sensor: what acts on pistons unseen (``bristle_filter``), less its noise (``quiet_force``).
+
+What is left at the start, before a hand comes, is taken for an error of the mass and of the pressure cells.
+"""
 
 from baselines.estimation import bristle_filter, force_bias, quiet_force
 from baselines.estimation.bristle_filter import Bristled
@@ -30,14 +33,33 @@ class Hand(Rows):
 
 
 @helper
-def observe(hand: Hand, seen: Signals, pistons: Pistons, joints: Joints, pressures: Array, noise: Array, about: Belief, fresh: Array) -> None:
-    """Carries ``hand`` on by one period."""
-    p, period, b, air = about.rig, about.period, hand.pistons, PerChamber(pressures)
-    point, sample, past = Point(scratch(Point.size)), Joints(scratch(Joints.size)), pistons.past
+def _since(pistons: Pistons, k: int, i: int, joints: Joints, periods: float) -> float:
+    """How far piston ``k`` of lane ``i`` has moved in the last ``periods``, by its observer, m; 0 where speeds are measured."""
+    past, slot = pistons.past, int(pistons.slot[i])
     depth = past.shape[0] // 2
+    if depth == 0:
+        return 0.0
+    back = min(int(periods), depth - 2)
+    newer, older = past[2 * ((slot - back) % depth) + k, i], past[2 * ((slot - back - 1) % depth) + k, i]
+    moved: float = joints.position[k, i] - (newer + min(periods - back, 1.0) * (older - newer))
+    return moved
+
+
+@helper
+def observe(
+    hand: Hand, seen: Signals, pistons: Pistons, joints: Joints, pressures: Array, noise: Array, about: Belief, fresh: Array
+) -> None:
+    """Carries ``hand`` on by one period, at whose end ``pistons`` are observed and pressures (4, N), Pa, known.
+
+    ``noise`` (N,), m, is that of a position sample.
+    """
+    p, period, b, air = about.rig, about.period, hand.pistons, PerChamber(pressures)
+    point, sample = Point(scratch(Point.size)), Joints(scratch(Joints.size))
     for i in range(fresh.shape[0]):
         y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
-        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)
+        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
+        )
         sampled = seen.position_time[i] - hand.newest[i]
         hand.newest[i] = seen.position_time[i]
         own1 = mechanics.acceleration1(0.0, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
@@ -53,12 +75,8 @@ def observe(hand: Hand, seen: Signals, pistons: Pistons, joints: Joints, pressur
             for axis in range(2):
                 point.position[axis, 0], point.velocity[axis, 0] = seen.position[axis, i], seen.velocity[axis, i]
             piston_motion(point.rows, p, sample.rows, 1)
-            periods, slot = (seen.time[i] - seen.position_time[i]) / period, int(pistons.slot[i])
-            back = min(int(periods), depth - 2)
-            share = min(periods - back, 1.0)
             for k in range(2):
-                newer, older = past[2 * ((slot - back) % depth) + k, i], past[2 * ((slot - back - 1) % depth) + k, i]
-                since = joints.position[k, i] - (newer + share * (older - newer))
+                since = _since(pistons, k, i, joints, (seen.time[i] - seen.position_time[i]) / period)
                 off = sample.position[k, 0] - (b.position[k, i] - since)
                 bristle_filter.correct(b, k, i, off, noise[i] / kappa if k == 0 else noise[i])
         across, along = -b.push[0, i] / kappa, b.push[1, i]
