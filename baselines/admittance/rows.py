@@ -1,6 +1,7 @@
 """Rows of the admittance law: what it remembers, what it knows at one instant, and its constants."""
 
 from baselines.estimation.admittance import Compliance
+from baselines.estimation.bristle_observer import Felt
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
@@ -43,6 +44,7 @@ class Memory(Rows):
     friction = part(Friction, "level of friction")
     inertia = part(Inertia, "mass")
     hand = part(Hand, "force of the hand without a sensor")
+    felt = part(Felt, "the same where friction is known")
     hold = part(Hold, "whether the head rests, without a force sensor")
     follower = part(Follower, "loop")
     pistons = part(Pistons, "observer")
@@ -67,6 +69,7 @@ class Beliefs(Numbers):
     sampled = number("1", "1 where positions are samples")
     force_sensor = number("1", "1 with a force sensor")
     weighed = number("1", "1 where an acceleration sensor tells the hand's force")
+    identified = number("1", "1 where friction is known and tells the hand's force")
     believed_limit = number("N", "that is believed to act unseen on a piston, at most")
     learns_noise = number("1", "1 where the tracker's noise is learned")
     place = number("1", "row of ``Seen`` at which a ``Point`` stands")
