@@ -166,7 +166,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     @property
     def scene(self) -> Scene:
-        """What a frame shows now, in any render mode; see ``birthsim_env.drawing.rendering.Scene``."""
+        """What a frame shows now, in any render mode; see ``birthsim_env.drawing.scene.Scene``."""
         return self._episodes.scene(0)
 
     def reset(

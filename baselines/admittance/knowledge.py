@@ -57,7 +57,8 @@ def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         for i in range(lanes):
             noise[i] = math.sqrt(memory.tracker.variance[i])
     if about.most_bias > 0.0:
-        force_bias.tare(memory.bias, seen.time, seen.user_force, about.most_bias, about.belief.period, hand)
+        steady, period = force_bias.STEADY, about.belief.period
+        force_bias.tare(memory.bias, seen.time, seen.user_force, about.most_bias, steady, period, hand)
     for i in range(lanes):
         for k in range(2):
             known.given.force[k, i] = hand[k, i] if about.force_sensor + about.weighed > 0.0 else 0.0

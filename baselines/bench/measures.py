@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.bench.metrics import Tally, fresh_tally, sample, window
-from birthsim_env import reward, success
+from birthsim_env import reward
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import compliance
@@ -35,7 +35,7 @@ class Memory(Tally):
     state = rows(STATES, "SI", "where the episode began")
     motion = rows(4, "SI", "of the end effector there")
     owed = part(reward.Owed, "for the reward")
-    calm = part(success.Tally, "for success")
+    calm = part(reward.Tally, "for success")
     success = row("1", "1 where the episode is successful so far")
     fallen = row("1", "1 where the lane has left the physical range")
     weight = rows(len(DISCOUNTS), "1", "of the next reward, for each of ``DISCOUNTS``")
@@ -82,7 +82,7 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
     terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), Ends(scratch(Ends.size)), seen.reference
     failed = ends.failed
     reward.assess(world, reference, own.owed, own.command, own.last, about.limits, terms, failed, n)
-    success.add(world, reference, failed, own.calm, ends.success, n)
+    reward.add(world, reference, failed, own.calm, ends.success, n)
     for i in range(n):
         paid = terms.total[i] if own.alive[i] > 0.0 else 0.0
         for k in range(len(DISCOUNTS)):

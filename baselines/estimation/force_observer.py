@@ -8,6 +8,8 @@ itself where less friction is there than believed. What is left at the start, be
 mass and of the pressure cells.
 """
 
+import math
+
 from baselines.estimation import force_bias
 from birthsim_env.loop.signals import Joints, PerPiston
 from birthsim_env.physics import geometry
@@ -56,4 +58,4 @@ def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig,
         x, y = across * cosine + along * sine, across * sine - along * cosine
         hand.filtered[0, i] = 0.0 if new else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
         hand.filtered[1, i] = 0.0 if new else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
-    force_bias.tare(hand.bias, time, hand.filtered, MOST_BIAS, period, hand.force)
+    force_bias.tare(hand.bias, time, hand.filtered, MOST_BIAS, math.inf, period, hand.force)

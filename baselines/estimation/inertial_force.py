@@ -8,6 +8,8 @@ held at rest (``held_force``).
 What is left at the start, before a hand comes, is taken for an error of the mass and of the pressure cells.
 """
 
+import math
+
 from baselines.estimation import force_bias, held_force
 from baselines.estimation.force_observer import MOST_BIAS, Hand
 from baselines.estimation.held_force import Hold
@@ -56,5 +58,5 @@ def observe(
         x, y = p.mass * ax + across * cosine + along * sine, p.mass * ay + across * sine - along * cosine
         hand.filtered[0, i] = 0.0 if fresh[i] > 0.0 else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
         hand.filtered[1, i] = 0.0 if fresh[i] > 0.0 else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
-    force_bias.tare(hand.bias, time, hand.filtered, MOST_BIAS, period, bare)
+    force_bias.tare(hand.bias, time, hand.filtered, MOST_BIAS, math.inf, period, bare)
     held_force.hold(hold, bare, period, fresh, hand.force)

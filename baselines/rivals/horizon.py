@@ -19,10 +19,10 @@ from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph, Value
-from birthsim_env.physics.gradients.runge_kutta import STAGES, ahead_of, weight_of
 from birthsim_env.physics.gradients.source import HEAD, loop, module_of
 from birthsim_env.physics.gradients.symbols import empty, inputs
 from birthsim_env.physics.gradients.tracing import call
+from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 NODES = 7
 """Nodes of the horizon."""

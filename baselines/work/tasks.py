@@ -91,6 +91,14 @@ def run_tasks(
     return {task.name: results[task.name] for task in tasks if task.name in results}, failures
 
 
+def result_of(task: Task, folder: Path) -> Result:
+    """The result of one task: from ``folder`` where that holds it, else worked out here, and then written there."""
+    path = folder / task.file()
+    if _read(path) is None:
+        _write(path, task, task.work(**task.settings))
+    return _read(path) or {}
+
+
 def _write(path: Path, task: Task, result: Result) -> None:
     content = finite({"code": task.code(), "settings": task.settings, "result": result})
     path.parent.mkdir(parents=True, exist_ok=True)

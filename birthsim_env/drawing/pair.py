@@ -98,7 +98,7 @@ class Pair:
     """Picture ``width`` px wide of two runs, ``names`` above them; ``title`` over both, the scales as in ``Half``."""
 
     def __init__(
-        self, parameters: Parameters, title: str, names: Sequence[str], span: tuple[float, float], top: float, width: int
+        self, parameters: Parameters, title: str, names: Sequence[str], span: tuple[float, float], top: float, width: int = 960
     ) -> None:
         self._unit = unit = width / 960
         self.width, self.height = width, round(0.66 * width / 2) * 2
@@ -150,11 +150,14 @@ class Pair:
             x += 2 * size + self._text.width(word) + 5 * self._margin
         return words
 
-    def draw(self, scenes: Sequence[Scene], times: NDArray[np.float64], errors: Sequence[NDArray[np.float64]]) -> None:
-        """Draw both scenes, with the errors (m) at the ``times`` (s) so far, on ``surface``."""
+    def frame(
+        self, scenes: Sequence[Scene], times: NDArray[np.float64], errors: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.uint8]:
+        """Draw both scenes, with the errors (m) at the ``times`` (s) so far, as (height, width, 3) RGB."""
         picture, margin = self.surface, self._margin
         picture.blit(self._background, (0, 0))
         for half, scene, error in zip(self._halves, scenes, errors, strict=True):
             half.draw(picture, scene, times, error)
         pull = f"pull {number(math.hypot(*scenes[0].user_force), '.0f')} N    t = {number(scenes[0].time, '.1f')} s"
         self._heading.write(picture, pull, (self.width - 2 * margin, margin), d.INK, (1, 0))
+        return d.pixels(picture)

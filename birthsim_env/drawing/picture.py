@@ -2,7 +2,9 @@
 
 import math
 
+import numpy as np
 import pygame
+from numpy.typing import NDArray
 
 from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.lettering import Lettering
@@ -33,7 +35,7 @@ class Picture:
         self._background = pygame.Surface((width, height), 0, 32)
         self._draw_background()
 
-    def pixel(self, point: Point) -> Point:
+    def to_pixel(self, point: Point) -> Point:
         """Pixel (column, row) of a world point, m, in the main view; whole numbers are pixel edges."""
         return self._view.pixel(point)
 
@@ -67,6 +69,11 @@ class Picture:
         self._view.draw_static(fine)
         d.paste(fine, self._background, Box(0, 0, self.width, self.height))
         self._panel.write_static(self._background)
+
+    def frame(self, scene: Scene) -> NDArray[np.uint8]:
+        """Draw the picture of ``scene`` as (height, width, 3) RGB; a fresh array each time."""
+        self.draw(scene)
+        return d.pixels(self.surface)
 
     def draw(self, scene: Scene) -> None:
         """Draw ``scene`` on ``surface``."""

@@ -13,7 +13,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.rows import SEEN, WORLD
+from birthsim_env.loop.rows import SEEN, TIME, WORLD
 from birthsim_env.loop.stage import Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
@@ -150,6 +150,13 @@ class Loop:
 
     def _between(self, periods: int, first: int, last: int) -> int:
         return int(_run(self._moves, self._stages, self._rows, self._lanes, periods, first, last))
+
+
+def sampled(stage: Stage, time: Array, first: int, count: int) -> Array:
+    """The rows (``count``, N) of ``Seen`` from ``first`` on that a stage writes at ``time`` (N,), s, of N lanes."""
+    now, rows = np.array(time[None], dtype=np.float64), np.zeros((count, len(time)))
+    Loop(len(time), [], [(now, TIME), (rows, first)], [stage]).run()
+    return rows
 
 
 class MixedLoop:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.backstepping.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
 from studies.verification.strict_feedback import strict_feedback_rates
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived

@@ -12,7 +12,6 @@ from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 from tests.oracles.closed_loop import FRICTIONLESS
-from tests.parts.test_own_parts import PerLane, spring
 
 PROBE = "BirthSIM/Probe-v2"
 RIG = Parameters()
@@ -126,12 +125,6 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
     assert not lost[::2].any()
     assert np.all(error[::2] < 1e-3)
     assert np.all(lost[1::2] | (error[1::2] > 0.01))
-
-
-def test_a_force_per_lane_is_a_force():
-    env, own = (gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, user_force=hand) for hand in (PerLane(), spring))
-    env.reset(seed=0), own.reset(seed=0)
-    np.testing.assert_allclose(required_strength_ratio(env), required_strength_ratio(own), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,12 @@ import pytest
 from PIL import Image
 
 import birthsim_env
-from baselines.commands import animate
+from baselines.commands import animate, episodes
 from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from baselines.staged import driving
-from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.drawing.pair import Pair
+from birthsim_env.drawing.scene import Scene
 from tests.console import call
 
 RIG = birthsim_env.Parameters()
@@ -35,7 +36,7 @@ def scene(**values):
 
 @pytest.fixture
 def pair():
-    return PairRenderer(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
+    return Pair(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
 
 
 @pytest.mark.parametrize("suffix", ["webp", pytest.param("gif", marks=pytest.mark.slow)])
@@ -107,7 +108,7 @@ def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch, ca
         asked.append((name, options))
         return make_controller(name, rig, **options)
 
-    monkeypatch.setattr(animate, "make_controller", spied)
+    monkeypatch.setattr(episodes, "make_controller", spied)
     path = tmp_path / "pull.webp"
     options = ("--controller", "pid", "residual", "--begin", 0.0, "--end", 1.0, "--rate", 10, "--out", path)
     assert call("animate", monkeypatch, capsys, *options)[0] == 0

@@ -234,4 +234,4 @@ def test_the_comparison_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, c
     case = ("--plant", "drawn-sensors", "--out", tmp_path / "out")
     status, _, complained = call("comparison", monkeypatch, capsys, *own, *case)
     assert status == 0, complained
-    assert 'BirthSIM/Probe-v2,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
+    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()

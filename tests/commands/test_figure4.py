@@ -115,7 +115,7 @@ def test_lab_sensors_cost_accuracy_but_not_stability(records):
 def test_the_same_run_twice_is_the_same(records, monkeypatch):
     """Its first three seconds: two pushes, noise of the sensors."""
     make = gymnasium.make
-    monkeypatch.setattr(figure4_command.gymnasium, "make", lambda *args, **options: make(*args, duration=3.0, **options))
+    monkeypatch.setattr(gymnasium, "make", lambda *args, **options: make(*args, duration=3.0, **options))
     again = record_run("backstepping", "lab")
     for name, values in records["backstepping", "lab"].items():
         np.testing.assert_array_equal(again[name], values[:3001], err_msg=name)

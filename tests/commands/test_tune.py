@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -201,22 +202,19 @@ def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, message, own
 
 
 def test_trials_of_another_search_are_not_mixed_in(own, tmp_path, trial_costs, monkeypatch, capsys):
-    out = tmp_path / "out"
-    assert call("tune", monkeypatch, capsys, "--controller", own, "--trials", 3, "--out", out)[0] == 0
-    before = (out / "trials.json").read_text()
-    for changed, said in (
-        (("--seed", 9), "seed = 0; allowed: 9"),
-        (("--sensors", "lab"), "sensors = ['ideal', 'lab']; allowed: ['lab']"),
-    ):
-        status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, *changed, "--out", out)
-        assert status == 2
-        assert f"{out}/trials.journal has {said}, or another --out" in complained
-    assert (out / "trials.json").read_text() == before
-    for foreign in ("{}\n", "trials\n\n"):
-        (out / "trials.journal").write_text(foreign)
-        status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, "--out", out)
-        assert status == 2
-        assert "trials.journal is no list of trials" in complained
+    tried, _ = trial_costs
+    run = lambda *options: call("tune", monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out", *options)[0]  # noqa: E731
+    assert run("--trials", 3) == 0
+    first = list(tried)
+    assert run("--trials", 3, "--sensors", "lab") == 0
+    assert tried[3:] == first, "the same gains, tried anew"
+    assert run("--trials", 4, "--seed", 9) == 0
+    assert len(tried) == 6 + 3, "the start is the same for every seed"
+    assert run("--trials", 3) == 0
+    assert len(tried) == 9
+    Path(own.removesuffix(":Own")).write_text(OWN + "\n")
+    assert run("--trials", 3) == 0
+    assert tried[9:] == first, "a controller's file that changed is another controller"
 
 
 def test_without_the_extra_it_says_how_to_get_it(own, tmp_path, monkeypatch, capsys):

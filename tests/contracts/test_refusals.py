@@ -14,6 +14,7 @@ from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import make_controller
+from baselines.rivals.symbolic import symbolic_model
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
@@ -154,6 +155,7 @@ TABLE = [
     (rig, "cylinder2.rod_diameter", (0.025,), "less than piston_diameter"),
     (rig, "valves.critical_ratio", (1.0,), ">= 0 and <= 0.9"),
     (rig, "valves.time_constant", (1e-5,), "(s)"),
+    (rig, "valves.opening_limit", (1.2,), "(-)"),
     (rig, "air.supply_pressure", (1e5,), "more than atmospheric_pressure"),
     (rig, "air.heat_capacity_ratio", (1,), "(-)"),
     (rig, "air.supply_conductance", (-1e-9,), "(m3/(s Pa))"),
@@ -185,7 +187,7 @@ TABLE = [
     (partial(listed_option, "shut-valves"), "gain", (3.0,), "for shut-valves: no options"),
     (partial(listed_option, "backstepping-cartesian"), "weight_compensation", (True,), "for backstepping: pneumatic_gain, "),
     (partial(listed_option, "admittance"), "learn", (2.0,), "True or False"),
-    (evaluation, "episodes", (0, -3), "a whole number >= 1"),
+    (evaluation, "episodes", (0, -3, 2.5), "a whole number >= 1"),
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
     *((kind, "parameters", (42,), "None, a Parameters, a mapping or the path") for kind in (Plant, BacksteppingController)),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),
@@ -206,6 +208,13 @@ TABLE = [
     (training, "log_std", ("low", NAN), "a finite number >= -20 and <= 2 (-)"),
     (training, "hidden", ((), (64, 0), (64.5,), (True,), 64), "1 to 8 whole numbers from 1 to 2048"),
     (training, "privileged", ("yes",), "True, False"),
+    (partial(training, algorithm="apg"), "privileged", (True,), ""),
+    (training, "target", ("wall",), "'spring', 'impedance'"),
+    (partial(training, algorithm="ppo"), "target", ("impedance",), "'spring'"),
+    (training, "beside", (3,), "ids of residual environments"),
+    (partial(training, algorithm="sac"), "beside", (("BirthSIM/ProbeResidual-v2",),), "()"),
+    (partial(training, algorithm="apg", beside=("a", "b")), "lanes", (32,), "a multiple of 3"),
+    (training, "margin", (-0.1,), ">= 0 and <= 1"),
     (training, "sensors", ("none",), "'ideal', 'lab'"),
     (training, "randomize", ("some",), "'plant', 'scenario'"),
     (training, "environment", (3,), "the id of a residual environment"),
@@ -252,6 +261,7 @@ TABLE = [
     (BacksteppingController, "valves", ("three",), "two_valves, one_valve"),
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
+    (symbolic_model, "algebra", ("maple",), "'sympy', 'casadi'"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),
 ]  # fmt: skip
 

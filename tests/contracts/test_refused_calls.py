@@ -9,7 +9,6 @@ import pytest
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
-from baselines.backstepping.lyapunov import LyapunovFunction
 from baselines.identification.experiment import propose
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
@@ -20,6 +19,7 @@ from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from studies.labour.model import Labour
+from studies.lyapunov import LyapunovFunction
 from studies.verification.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
@@ -86,6 +86,10 @@ def stage(**given):
 
 def plant(*given, **named):
     return lambda: Plant(*given, **named)
+
+
+def advanced(opening=STILL[0], force=STILL[1], duration=0.01):
+    return lambda: Plant(num_envs=2).advance(opening, force, duration)
 
 
 def rates(of_state, of_flows):
@@ -216,6 +220,17 @@ TABLE = {
     ("parameters[1] = 7", "a Parameters"): [plant(parameters=[RIG, 7], num_envs=2)],
     ("state has shape (17, 2)", "(18, 2)"): [lambda: Plant(num_envs=2).derivatives(np.zeros((17, 2)), *STILL)],
     ("state[0, 0] = nan", ""): [lambda: Plant(num_envs=2).derivatives(np.full((18, 2), NAN), *STILL)],
+    ("opening_command reaches 1.5", "-1 to 1"): [advanced(STILL[0] + 1.5)],
+    ("opening_command[0, 0] = nan", "finite"): [advanced(STILL[0] * NAN)],
+    ("opening_command has shape (4,)", "(4, 2)"): [advanced(np.zeros(4))],
+    ("opening_command = 'wide'", "numbers"): [advanced("wide")],
+    ("user_force[0, 0] = inf", "finite numbers (N)"): [advanced(force=STILL[1] + INF)],
+    ("user_force has shape", "(2, 2)"): [
+        advanced(force=wrong) for wrong in ([1.0, 2.0], 5.0, np.zeros((0, 2, 2)), np.zeros((2, 3, 2, 2)))
+    ],
+    ("user_force has shape (5, 2, 3)", "(5, 2, 2)"): [advanced(force=np.zeros((5, 2, 3)))],
+    ("user_force = [[1, 2], [3]]", "numbers of shape (2, 2)"): [advanced(force=[[1, 2], [3]])],
+    ("duration = ", "a positive number, at most 3600 (s)"): [advanced(duration=wrong) for wrong in (NAN, 0, -0.01, "long")],
     ("position = (0.5, 9) m is unreachable", ""): [linear(pose=(0.5, 9.0))],
     ("pose[1] = nan", "finite numbers"): [linear(pose=(0.5, NAN))],
     ("pressures = ", "101300 to 700000 (Pa"): [linear(pressures=(1e5, 2e5, 3e5, 9e5))],
@@ -225,6 +240,7 @@ TABLE = {
     ("force has shape (1,)", "(2,)"): [linear(force=(1.0,))],
     ("frequency = 0", "above 0"): [lambda: linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])],
     ("unknown parameter 'mechanics.weight'", "mass, gravity"): [lambda: RIG.replace({"mechanics.weight": 0.9})],
+    ("'mechanics.mas' (did you mean 'mass'?)", "mass, gravity"): [lambda: RIG.replace({"mechanics.mas": 0.9})],
     ("unknown parameter section 'motor'", "geometry, cylinder1"): [lambda: RIG.replace({"motor.mass": 0.9})],
     ("Geometry.k1 = 0.43 with stroke 0.2 is impossible", ""): [lambda: RIG.replace({"geometry.d3": 0.9})],
     ("Geometry.k1 = 0.43 with stroke 0.4", ""): [

@@ -42,6 +42,7 @@ TABLE = {
     "evaluate --controller backsteping --out x": "(did you mean 'backstepping'?); allowed: a registered name",
     "evaluate --controller own.py:Mine --out x": "own.py' has no 'Mine'; allowed: a name that it defines: ",
     "evaluate --controller residual --policy none --out x": "none' holds no policy; allowed: a folder that birthsim train",
+    "evaluate --controller pid": ("--out is missing", "--help"),
     "evaluate --episodes -3 --out x": ("--episodes", f"'-3'; {NUMBER}"),
     "evaluate --episodes some --out x": ("--episodes", f"'some'; {NUMBER}"),
     "evaluate --episods 3 --out x": "--episods. Did you mean --episodes?",

@@ -69,13 +69,21 @@ def test_a_force_sensor_is_tared_at_the_start_up_to_what_its_bias_can_be():
     memory, force = np.zeros((2, 1)), np.empty((2, 1))
     measured = np.array([[0.5], [-50.0]])
     for k in range(1000):
-        force_bias.tare(memory, np.array([k * PERIOD]), measured, 2.0, PERIOD, force)
+        force_bias.tare(memory, np.array([k * PERIOD]), measured, 2.0, 0.5, PERIOD, force)
     np.testing.assert_allclose(force[:, 0], [0.0, -48.0], atol=1e-12)
+
+
+def test_a_hand_that_comes_while_a_force_sensor_is_tared_does_not_count():
+    memory, force = np.zeros((2, 1)), np.empty((2, 1))
+    for k in range(1000):
+        hand = np.array([[20.0 * (k * PERIOD > 0.1)], [-8.0 * (k * PERIOD > 0.2)]])
+        force_bias.tare(memory, np.array([k * PERIOD]), 0.5 + hand, 2.0, 0.5, PERIOD, force)
+    np.testing.assert_allclose(force[:, 0], [20.0, -8.0], atol=1e-12)
 
 
 def test_a_law_that_starts_later_tares_nothing():
     memory, force = np.zeros((2, 1)), np.empty((2, 1))
-    force_bias.tare(memory, np.array([3.0]), np.ones((2, 1)), 2.0, PERIOD, force)
+    force_bias.tare(memory, np.array([3.0]), np.ones((2, 1)), 2.0, 0.5, PERIOD, force)
     np.testing.assert_array_equal(force, 1.0)
 
 

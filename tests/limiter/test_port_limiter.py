@@ -116,17 +116,6 @@ def test_a_compiled_loop_and_calls_once_a_period_give_the_same_bits(law):
     np.testing.assert_array_equal(*ends)
 
 
-def test_a_lane_starts_anew():
-    inner = Full()
-    limiter = PortLimiter(inner, RIG)
-    run(-20.0, limiter, 3.0, lanes=2)
-    limiter.reset(np.array([True, False]))
-    assert limiter.authority[0] == 1.0 > limiter.authority[1]
-    np.testing.assert_array_equal(inner.forgotten, [True, False])
-    out = limiter.command(seen(0.0, np.full(2, 0.05), 0.0, -50.0), targets(2))
-    assert (out[:, 0] == 1.0).all(), "what was before a start does no work"
-
-
 def test_a_law_that_returns_no_openings_is_refused_by_name():
     law = Full()
     law.command = lambda measurement, reference: None

@@ -119,14 +119,15 @@ class Server:
 
 
 class Folder:
-    """A server of the files in a folder, as ``python -m http.server``; entering gives its address."""
+    """A server of the files in a folder, as ``python -m http.server``, at ``url``."""
 
     def __init__(self, folder):
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
+        self.url = f"http://127.0.0.1:{self._server.server_port}/"
 
     def __enter__(self):
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
-        return f"http://127.0.0.1:{self._server.server_port}/"
+        return self
 
     def __exit__(self, *_):
         self._server.shutdown()
@@ -146,8 +147,8 @@ def launch(playwright):
 
 
 class Window:
-    """One tab with the page, and with its ``lab`` open unless told otherwise; ``complaints`` collects console errors,
-    ``foreign`` requests that left this machine."""
+    """One tab with the page, and with its ``lab`` open unless told otherwise; at its end there must have been no
+    ``complaints``, which are console errors, and no ``foreign`` requests, which left this machine."""
 
     def __init__(self, browser, url, size=WIDE, touch=False, lab=True):
         self.context = browser.new_context(viewport=size, accept_downloads=True, has_touch=touch)
@@ -163,8 +164,9 @@ class Window:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, failed, *_):
         self.context.close()
+        assert failed or (self.complaints, self.foreign) == ([], [])
 
     def _asked(self, request):
         if not re.match(r"(https?|wss?)://127\.0\.0\.1[:/]|data:|blob:", request.url):
@@ -196,6 +198,25 @@ class Window:
 
     def frame(self):
         return self.value("birthsim.frame")
+
+    def choose(self, **choices):
+        """Choose in lists, one after the other, and wait until the rig has each."""
+        for name, choice in choices.items():
+            self.page.locator(f"select[name={name}]").select_option(choice)
+            self.wait(f"birthsim.settings.{name} === '{choice}'")
+
+    def pause(self, paused=True):
+        self.page.evaluate(f"birthsim.send({{ type: 'pause', paused: {str(paused).lower()} }})")
+        self.wait(f"birthsim.state.paused === {str(paused).lower()}")
+
+    def play(self, recording):
+        self.page.locator("#choose").set_input_files(recording)
+        self.wait("birthsim.hello.mode === 'replay'")
+
+    def back(self):
+        """From a recording to the rig."""
+        self.page.locator("#back").click()
+        self.wait("birthsim.hello.mode === 'live'")
 
     def end_effector(self):
         """Where the end effector is in the window, px."""

@@ -20,8 +20,6 @@ def window(chromium, server):
     with Window(chromium, server.url + CALM) as opened:
         opened.wait(f"birthsim.settings.controller === '{CALM.partition('=')[2]}'")
         yield opened
-        assert opened.complaints == []
-        assert opened.foreign == []
 
 
 @pytest.fixture(scope="session")

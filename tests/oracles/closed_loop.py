@@ -1,6 +1,7 @@
 """A rig under a law, control period by control period, for the tests of the controllers: measurements and references."""
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,19 @@ def shorten_probes(
     """Stiffness tests with other times than those of the comparison, s, for as long as ``patch`` lasts."""
     for name, seconds in (("REST", rest), ("RISE", rise), ("HOLD", hold), ("WINDOW", window)):
         patch.setattr(probes, name, seconds)
+
+
+def pushes(
+    forces: Sequence[float],
+    setpoints: Sequence[float] = (1000.0, 2000.0, 4000.0),
+    rigs: Sequence[Parameters] = (Parameters(),),
+    poses: Sequence[tuple[float, float]] = probes.POSES,
+) -> probes.StiffnessTest:
+    """Every force, N, along both axes at every pose and setpoint, N/m, on every rig: a lane each."""
+    place, stiffness, axis, force, own = zip(*itertools.product(poses, setpoints, (0, 1), forces, rigs), strict=True)
+    push = np.array(force) * (np.array(axis) == np.array([[0], [1]]))
+    rows = np.array([stiffness, stiffness, np.zeros(len(force))])
+    return probes.StiffnessTest(np.array(place).T.copy(), push, rows, own if len(rigs) > 1 else rigs[0])
 
 
 def ideal(plant: Plant, time: float, force: Array) -> Measurement:

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from birthsim_env import UserForce
-from birthsim_env.parts.drawn.seeding import stream
 
 PROBE = "BirthSIM/Probe-v2"
 
@@ -69,25 +68,6 @@ def test_a_closed_loop_force_is_asked_every_control_period_with_the_present_moti
     np.testing.assert_allclose(info["user_force"], spring(None, *spy.asked[-1][1:])[0, :, 0])
     assert info["position"][0] > wall
     assert info["user_force"][0] < -1.0
-
-
-def test_a_users_force_serves_many_lanes_and_draws_from_its_own_stream():
-    class Bias(UserForce):
-        def prepare(self, num_envs):
-            self.size = np.zeros(num_envs)
-
-        def begin(self, lane, rng):
-            self.size[lane] = rng.uniform(1, 9)
-
-        def force(self, time, position, velocity):
-            return np.stack([np.broadcast_to(self.size, time.shape), np.zeros_like(time)], axis=1)
-
-    many = gymnasium.make_vec(PROBE, num_envs=3, user_force=Bias())
-    infos = many.reset(seed=4)[1]
-    drawn = [stream(4 + lane, 0, "user_force").uniform(1, 9) for lane in range(3)]
-    np.testing.assert_array_equal(infos["user_force"][:, 0], drawn)
-    one = gymnasium.make(PROBE, user_force=Bias())
-    assert one.reset(seed=6)[1]["user_force"][0] == drawn[2]
 
 
 def test_a_force_may_answer_with_one_array_that_it_fills_anew():

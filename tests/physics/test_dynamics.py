@@ -11,14 +11,7 @@ from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.accuracy import second_model
 from studies.accuracy.second_model import SecondModel
-from tests.physics.test_second_model import DEMANDING_RIG, OTHER_RIG
-
-LAWS = ("lugre", "coulomb", "elasto_plastic")
-MOVED = {
-    **{"cylinder1.coulomb_friction": 9.0, "cylinder1.viscous_friction": 20.0, "cylinder2.viscous_friction": 50.0},
-    **{"cylinder2.piston_diameter": 0.03, "cylinder1.rod_diameter": 0.008, "mechanics.mass": 2.5},
-}
-"""Cylinders that differ in everything, so that no figure of one may stand for the other's."""
+from tests.physics.rigs import DEMANDING, LAWS, MOVED, OTHER
 
 
 def anywhere(rig: Parameters, lanes: int, seed: int) -> tuple[Plant, Array, Array]:
@@ -43,7 +36,7 @@ def shown(rig: Parameters, plant: Plant, state: Array) -> Array:
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("changes", [MOVED, OTHER_RIG, DEMANDING_RIG], ids=["moved", "other", "demanding"])
+@pytest.mark.parametrize("changes", [MOVED, OTHER, DEMANDING], ids=["moved", "other", "demanding"])
 def test_rates_are_the_second_models(changes: dict[str, object], law: str) -> None:
     """Its own rates at a state are the slope of its coordinates along the plant's rates."""
     rig = Parameters().replace({**changes, "friction.law": law})

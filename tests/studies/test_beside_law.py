@@ -10,6 +10,7 @@ from studies.residual import beside_law
 from tests.console import call
 
 LAW = "backstepping-force-first"
+BESIDE = ("all seeds", "backstepping", "all seeds, less than backstepping")
 
 
 @pytest.fixture
@@ -29,10 +30,8 @@ def test_one_seed_stands_beside_its_controller_and_the_mean_of_one_is_itself(tol
     monkeypatch.setattr(beside_law, "_privileged", lambda folder: True)
     monkeypatch.setattr(beside_law, "acting", lambda policy, env, privileged: policy)
     ideal = ("--sensors", "ideal", "--episodes", 3, "--beside", "backstepping", "--parameters", "")
-    law, own, every, other, less = told("--policy", tmp_path / "own", *ideal)["errors"]
-    assert [row["who"] for row in (law, own, every, other, less)] == [
-        LAW, "own seed_0", "all seeds", "backstepping", "all seeds, less than backstepping",
-    ]  # fmt: skip
+    law, own, every, *others = told("--policy", tmp_path / "own", *ideal)["errors"]
+    assert [row["who"] for row in (law, own, every, *others)] == [LAW, "own seed_0", *BESIDE]
     assert own["error"][0] < law["error"][0], "a law of millimetres, a policy of half of one"
     assert own["less"] == every["less"]
     assert own["less"]["median"][0] > 0.0
@@ -60,10 +59,7 @@ def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(told):
 def test_other_laws_and_policies_run_in_the_same_worlds(told):
     student = "circle_honest_student"
     rows = told("--policy", student, "--beside", "backstepping", student, "--episodes", 8, "--rigs", 1)["errors"]
-    seeds = [f"{student} seed_{k}" for k in range(5)]
-    assert [row["who"] for row in rows] == [
-        LAW, *seeds, "all seeds", "backstepping", "all seeds, less than backstepping",
-    ]  # fmt: skip
+    assert [row["who"] for row in rows] == [LAW, *(f"{student} seed_{k}" for k in range(5)), *BESIDE]
 
 
 @pytest.mark.slow

@@ -23,24 +23,21 @@ def test_what_prose_quotes_is_a_figure(page, name):
 
 def test_a_figure_is_that_of_its_row():
     figures = read_result("circle")["figures"]
-    where = dict(
-        zip(figures["columns"], next(row for row in figures["rows"] if row[4] == "pid" and row[1] == "lab"), strict=True)
-    )
+    row = next(row for row in figures["rows"] if row[4] == "pid" and row[1] == "lab")
+    where = dict(zip(figures["columns"], row, strict=True))
     assert where["metric"] == "settled_rms"
     assert figure("circle:lab/pid/settled_rms/median") == f"{where['median']:.3g}"
     assert figure("worst:0/above") == str(read_result("worst")["figures"][0]["above"])
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("moon:a", "results/moon.json"),
-        ("circle:lab/settled_rms/median", "rows with ['lab', 'settled_rms']; allowed: one row"),
-        ("circle:lab/pid/settled_rms/size", "of environment, sensors"),
-        ("worst:0/nothing", "'nothing'; allowed: controller, sensors"),
-        ("worst:0", "is no number"),
-    ],
-)
+NONE = {
+    "moon:a": "results/moon.json", "circle:lab/settled_rms/median": "rows with ['lab', 'settled_rms']; allowed: one row",
+    "circle:lab/pid/settled_rms/size": "of environment, sensors", "worst:0": "is no number",
+    "worst:0/nothing": "'nothing'; allowed: controller, sensors",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "said"), NONE.items())
 def test_a_name_that_leads_to_no_figure_is_refused(name, said):
     with pytest.raises(ValueError, match="figure = ") as refusal:
         figure(name)

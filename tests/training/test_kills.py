@@ -1,6 +1,5 @@
 """Trainings that die: they go on, and end with the policy and the curve of one that never did."""
 
-import json
 import signal
 import subprocess
 import sys
@@ -85,16 +84,6 @@ def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(tmp_path, 
         assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(reached["curve"]))
 
 
-@pytest.mark.usefixtures("brief")
-def test_one_that_dies_again_and_again_gets_there_as_well(tmp_path, monkeypatch):
-    expected = train(TINY, RESIDUAL, tmp_path / "whole")
-    for _ in range(3):
-        killed(monkeypatch, TINY, tmp_path / "cut", "_on_step", 40)
-    reached = train(TINY, RESIDUAL, tmp_path / "cut")
-    assert steady(reached["curve"]) == steady(expected["curve"])
-    assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize(("module", "name"), [(monitor, "save_checkpoint"), (reached, "save_policy")])
@@ -129,14 +118,6 @@ def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, 
         train(TINY, RESIDUAL, tmp_path)
     assert "interrupted after 0 steps: policy and checkpoint are kept in " in capsys.readouterr().out
     assert load_policy(tmp_path).settings == RESIDUAL
-
-
-@pytest.mark.usefixtures("brief")
-def test_a_training_that_is_over_is_not_trained_any_further(tmp_path):
-    reached = train(TINY, RESIDUAL, tmp_path)
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
-    assert json.dumps(train(TINY, RESIDUAL, tmp_path)) == json.dumps(reached)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
 CONFIGURATION = """[training]

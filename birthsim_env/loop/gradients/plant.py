@@ -17,8 +17,8 @@ from birthsim_env.physics.gradients import symbols, tracing
 from birthsim_env.physics.gradients.graph import Graph
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics.gradients.right_hand_side import INPUTS
-from birthsim_env.physics.gradients.runge_kutta import STAGES
 from birthsim_env.physics.gradients.steps import adjoint, back_over, lay_out
+from birthsim_env.physics.runge_kutta import STAGES
 
 ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]
 """Of the space, in the order of gradients: state, openings, force."""

@@ -15,7 +15,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
-from birthsim_env.physics.gradients.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 adjoint, adjoint_rig, tangent_rig = made.adjoint, made.adjoint_rig, made.tangent_rig
 

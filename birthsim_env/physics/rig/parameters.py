@@ -11,7 +11,7 @@ import tomli_w
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.sections import Air, Chambers, Cylinder, Friction, Geometry, Mechanics, Valves
-from birthsim_env.physics.rig.values import in_line, is_finite, shown
+from birthsim_env.physics.rig.values import in_line, is_finite, near, shown
 
 __all__ = [
     "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters", "Valves", "field_of",
@@ -121,15 +121,17 @@ class Parameters:
         return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
     @classmethod
-    def from_dict(cls, sections: dict[str, dict[str, Any]]) -> Self:
-        """Inverse of ``to_dict``; what is not named keeps its default."""
+    def from_dict(cls, sections: dict[str, Any]) -> Self:
+        """Inverse of ``to_dict``; ``"mechanics.mass"`` may name a value too. What is not named keeps its default."""
         changes = {}
         for section, values in sections.items():
-            if not isinstance(values, dict):
+            if "." in section:
+                changes[section] = values
+            elif not isinstance(values, dict):
                 raise ValueError(
                     f"{in_line(section)} = {shown(values)}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}"
                 )
-            if section != RANDOMIZE:
+            elif section != RANDOMIZE:
                 changes.update({f"{section}.{name}": value for name, value in values.items()})
         return dataclasses.replace(cls().replace(changes), ranges=_own_ranges(sections.get(RANDOMIZE, {})))
 
@@ -207,13 +209,13 @@ def field_of(dotted: str) -> dataclasses.Field[Any]:
         raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(_SECTIONS)}")
     fields = {field.name: field for field in dataclasses.fields(_SECTIONS[section])}  # type: ignore[arg-type]
     if name not in fields:
-        raise ValueError(f"unknown parameter {shown(dotted)}; allowed in {section}: {', '.join(fields)}")
+        raise ValueError(f"unknown parameter {shown(dotted)}{near(name, fields)}; allowed in {section}: {', '.join(fields)}")
     return fields[name]
 
 
 def load_parameters(parameters: Parameters | Mapping[str, Any] | str | Path | None) -> Parameters:
     """What ``parameters=`` accepts everywhere: nothing (defaults), a ``Parameters``, the path of a TOML file, or what such a
-    file holds as a mapping: ``{"mechanics": {"mass": 4.0}}``."""
+    file holds as a mapping: ``{"mechanics": {"mass": 4.0}}`` or ``{"mechanics.mass": 4.0}``."""
     if parameters is None:
         return Parameters()
     if isinstance(parameters, Parameters):

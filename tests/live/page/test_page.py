@@ -1,79 +1,12 @@
 """The live page in headless Chromium, pushed and looked at as a person would: real mouse and key events."""
 
-import pytest
-
-from tests.live.browser import NARROW, Window, displacement, rendered
+from tests.live.browser import NARROW, Window
 
 
-def slide(window, name, value):
-    """Move a slider with the arrow keys until the rig has taken ``value`` over."""
-    slider = window.page.locator(f"#set-{name}")
-    for _ in range(200):
-        now = window.value(f"birthsim.settings.{name}")
-        if now == pytest.approx(value):
-            return
-        slider.press("ArrowRight" if value > now else "ArrowLeft")
-        window.wait(f"birthsim.settings.{name} !== {now!r}")
-    raise AssertionError(f"{name} never became {value}")
-
-
-def test_displacement_is_force_over_stiffness_and_halves_at_twice_the_stiffness(window):
-    # A soft spring held far away pulls almost as hard when the end effector gives way.
-    window.page.locator("#set-drag_stiffness").press("Home")
-    window.wait("birthsim.settings.drag_stiffness === birthsim.hello.ranges.drag_stiffness.min")
-    window.hold(across=90)
-    soft = window.settle(least=10)
-    stiffness = soft["stiffness"][0]
-    assert displacement(soft)[0] > 5e-3
-    assert displacement(soft)[0] == pytest.approx(rendered(soft)[0], rel=0.1)
-
-    # Figures are written a few times a second: those of the rest follow.
-    digits = "document.querySelector('[data-figure=displacement] dd span').innerText"
-    shown = f"{digits}.replaceAll('\u2212', '-').split(/\\s+/).map(Number)"
-    wanted = [1e3 * part for part in displacement(soft)]
-    window.wait(f"{wanted}.every((part, k) => Math.abs(part - ({shown})[k]) < 0.5)")
-
-    slide(window, "Kclx", 2 * stiffness)
-    window.wait(f"birthsim.frame.stiffness[0] > {1.99 * stiffness}")
-    stiff = window.settle(least=10)
-    assert displacement(stiff)[0] == pytest.approx(rendered(stiff)[0], rel=0.1)
-    assert displacement(stiff)[0] / displacement(soft)[0] == pytest.approx(0.5, rel=0.1)
-
-    window.page.mouse.up()
-    window.wait("birthsim.frame.pointer === null && Math.hypot(...birthsim.frame.force) === 0")
-    window.page.locator("#stiffness-source").click()
-    window.wait(f"birthsim.settings.stiffness_source === 'scenario' && birthsim.settings.Kclx === {stiffness}")
-
-
-def test_every_input_has_a_name_and_every_choice_is_offered(window):
-    nameless = window.value(
-        "[...document.querySelectorAll('input, select, button')]"
-        ".filter((e) => !(e.labels?.length || e.textContent.trim() || e.ariaLabel)).map((e) => e.outerHTML)"
-    )
-    assert nameless == []
+def test_every_choice_is_offered(window):
     for name in ("scenario", "controller", "valves", "sensors"):
         offered = window.value(f"document.querySelector('select[name={name}]').options.length")
         assert offered == window.value(f"birthsim.hello.choices.{name}.length")
-
-
-def test_a_choice_changes_the_running_rig_without_a_break(window):
-    before = window.frame()
-    window.page.locator("select[name=scenario]").select_option("circle")
-    window.wait("birthsim.settings.scenario === 'circle'")
-    after = window.wait("birthsim.frame.time > " + str(before["time"] + 0.2) + " && birthsim.frame")
-    # Bridged: the target leaves where it was, it does not jump.
-    assert max(abs(a - b) for a, b in zip(after["position"], before["position"], strict=True)) < 0.1
-    window.page.locator("select[name=scenario]").select_option("probe")
-    window.wait("birthsim.settings.scenario === 'probe'")
-
-
-def test_keys_push(window):
-    window.page.keyboard.down("ArrowUp")
-    pushed = window.settle(least=15)
-    assert pushed["force"][1] == pytest.approx(20, abs=4)
-    assert pushed["force"][0] == pytest.approx(0, abs=2)
-    window.page.keyboard.up("ArrowUp")
-    window.wait("birthsim.frame.pointer === null")
 
 
 def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, server):
@@ -115,11 +48,9 @@ def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, serve
         handle.tap()
         window.wait(f"{sheet}.clientHeight === 40")
         assert window.value("document.documentElement.scrollHeight") == NARROW["height"]
-        assert window.complaints == []
 
 
 def test_slow_motion(window):
-    window.page.locator("#speed").select_option("0.1")
-    window.wait("birthsim.state.speed === 0.1")
-    window.page.locator("#speed").select_option("1")
-    window.wait("birthsim.state.speed === 1")
+    for speed in ("0.1", "1"):
+        window.page.locator("#speed").select_option(speed)
+        window.wait(f"birthsim.state.speed === {speed}")

@@ -14,13 +14,15 @@ from tests.console import PATIENCE, call
 
 @pytest.mark.slow
 def test_the_command_serves_until_an_interrupt_and_leaves_nothing(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "birthsim", "live", "--port", "0"]
+    host = "127.0.0.2" if sys.platform == "linux" else "127.0.0.1"  # others lack the rest of 127.0.0.0/8
+    command = [sys.executable, "-m", "birthsim", "live", "--port", "0", "--host", host]
     env = {**os.environ, "TMPDIR": str(tmp_path)}
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=env) as process:
         try:
             assert process.stdout is not None
             line = next(line for line in process.stdout if "http://" in line)
             address = next(word for word in line.split() if word.startswith("http:"))
+            assert address.startswith(f"http://{host}:")
             with urlopen(f"{address}/rig/loop.wasm") as answer:
                 assert answer.read(4) == b"\0asm"
             process.send_signal(signal.SIGINT)
