@@ -4,6 +4,8 @@ less its noise (``quiet_force``).
 What is left at the start, before a hand comes, is taken for an error of the mass and of the pressure cells.
 """
 
+import math
+
 from baselines.estimation import bristle_filter, force_bias, quiet_force
 from baselines.estimation.bristle_filter import Bristled
 from baselines.estimation.force_observer import MOST_BIAS, Hand
@@ -85,5 +87,5 @@ def observe(
         across, along = -b.push[0, i] / kappa, b.push[1, i]
         hand.filtered[0, i], hand.filtered[1, i] = across * cosine + along * sine, across * sine - along * cosine
     bare = scratch(2)[:, : fresh.shape[0]]
-    force_bias.tare(hand.bias, seen.time, hand.filtered, MOST_BIAS, period, bare)
+    force_bias.tare(hand.bias, seen.time, hand.filtered, MOST_BIAS, math.inf, period, bare)
     quiet_force.quieten(felt.quiet, bare, period, fresh, hand.force)
