@@ -224,7 +224,7 @@ TABLE = [
 
 def title(call):
     inner = call.args[0] if isinstance(call, partial) and call.args else getattr(call, "func", call)
-    return getattr(inner, "__name__", inner)
+    return getattr(inner, "__name__", inner if isinstance(inner, str) else type(inner).__name__)
 
 
 CASES = [

@@ -60,7 +60,7 @@ class Law:
         quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
         gains = Gains.numbers(
             pneumatic_gain=30.0, gain=self.gain, rest_gain=self.rest_gain, rest_push=self.rest_push, dead_zone=self.dead_zone,
-            quickness=quickness, oscillation=0.06, yielding=0.9, least_fraction=LEAST_FRACTION, most_falls=1.0,
+            quickness=quickness, oscillation=0.06, swing=0.0, yielding=0.9, least_fraction=LEAST_FRACTION, most_falls=1.0,
         )  # fmt: skip
         admittance_law.command(seen, memory, known, Gains(gains), Belief(belief(self.rig)))
         return seen.opening
@@ -177,7 +177,7 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
 
 def watched(errors: Array, fall: float = 0.9, most: float = 1.0) -> Array:
     """The gain fraction after each of the speed errors (T,), one per period."""
-    gains = Gains(Gains.lane(oscillation=0.06, yielding=fall, least_fraction=0.35, most_falls=most))
+    gains = Gains(Gains.lane(oscillation=0.06, swing=0.0, yielding=fall, least_fraction=0.35, most_falls=most))
     one = remembered(1).follower.along
     return np.array([admittance_law.watch(one, 0, float(error), PERIOD, gains) for error in errors])
 

@@ -6,6 +6,8 @@ import gymnasium
 import numpy as np
 import pytest
 
+import birthsim_env  # noqa: F401  registers the ids
+
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = math.nan, math.inf
 

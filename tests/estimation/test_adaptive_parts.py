@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from baselines.estimation import force_bias, friction_level, inertia, observers, tracker_noise
+from baselines.estimation import force_bias, force_observer, friction_level, inertia, observers, tracker_noise
+from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics import geometry
+from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -126,3 +127,24 @@ def test_the_mass_is_that_of_newtons_law_as_far_as_the_swing_outweighs_the_belie
 
 def test_what_is_stuck_or_heavier_than_believed_changes_nothing():
     assert swung(1.0, held=1.0) == swung(6.0) == Parameters().mechanics.mass
+
+
+@pytest.mark.parametrize("slides", [0.0, 0.02])
+def test_the_hand_is_found_from_what_the_force_balance_leaves(slides):
+    """Both pistons rest, or slide against friction of which the observer takes off its fraction."""
+    p, hand = Rig(parameter_column(Parameters())), np.array([7.0, -4.0])
+    found, fresh, y = Hand(np.zeros((Hand.size, 1))), np.ones(1), np.array([0.02, -0.01])
+    for k in range(1500):
+        moved = slides if k >= 500 else 0.0
+        y = y + moved * PERIOD
+        pose = geometry.pose(y[0], y[1], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)
+        kappa, sine, cosine = pose[5:]
+        push = hand if k >= 500 else np.zeros(2)
+        left = np.array([mechanics.user_force1(*push, kappa, sine, cosine), mechanics.user_force2(*push, sine, cosine)])
+        # Unknown friction is what the fraction leaves out of the believed one.
+        left -= force_observer.FRICTION_FRACTION * np.array([p.fc1, p.fc2]) * np.sign(moved)
+        joints = np.array([*y, moved, moved])[:, None]
+        force_observer.observe(found, np.array([k * PERIOD]), Joints(joints), left[:, None], p, PERIOD, fresh)
+        fresh[:] = 0.0
+    # The low-pass has had 40 time constants; J changes by 1 % of itself in one of them while the pistons slide.
+    np.testing.assert_allclose(found.force[:, 0], hand, rtol=0.01)
