@@ -53,7 +53,7 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
     reference, motion = seen.reference, world.motion
     for i in range(n):
         info.time[i], info.since_jump[i] = seen.time[i], world.since_jump[i]
-        given = given_way(reference, world.force, i)
+        given = given_way(reference, world.force[0, i], world.force[1, i], i)
         for k in range(2):
             compliant = reference.position[k, i] + given[k]
             info.position[k, i], info.velocity[k, i] = motion.position[k, i], motion.velocity[k, i]

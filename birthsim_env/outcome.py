@@ -9,6 +9,7 @@ from birthsim_env import info, observation, reward
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Mask, given_way
 from birthsim_env.loop.stage import Stage, block, singles, table2
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
@@ -52,14 +53,12 @@ def _close(world: World, seen: Seen, memory: int, about: About, tables: int, lan
         terms = reward.Terms(table2(tables, 0)[:, mine])
         reward.assess(world, reference, own.owed, action, own.action, about.limits, terms, ends.failed, n)
         reward.add(world, reference, ends.failed, own.tally, ends.success, n)
-        for k in range(size):
-            for i in range(n):
-                own.action[k, i] = action[k, i]
+        dynamics.copy(action, own.action, n)
     else:
         for i in range(n):
             if own.fresh[i] > 0.0:
                 # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
-                given = given_way(reference, world.force, i)
+                given = given_way(reference, world.force[0, i], world.force[1, i], i)
                 for axis in range(2):
                     own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
                 own.fresh[i], ends.failed[i], ends.success[i] = 0.0, 0.0, 0.0

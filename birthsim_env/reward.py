@@ -104,7 +104,8 @@ def assess(
     unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
     state = world.state
     for i in range(n):
-        given, jumped = given_way(reference, world.force, i), world.since_jump[i] < limits.jumped_below
+        given = given_way(reference, world.force[0, i], world.force[1, i], i)
+        jumped = world.since_jump[i] < limits.jumped_below
         error, speed = 0.0, 0.0
         for axis in range(2):
             change = given[axis] - owed.given[axis, i]
@@ -144,7 +145,7 @@ def add(world: World, reference: Reference, failed: Array, tally: Tally, success
     there is such a step. An episode that has ``failed`` (N,) is none.
     """
     for i in range(n):
-        given_x, given_y = given_way(reference, world.force, i)
+        given_x, given_y = given_way(reference, world.force[0, i], world.force[1, i], i)
         x = world.motion.position[0, i] - reference.position[0, i] - given_x
         y = world.motion.position[1, i] - reference.position[1, i] - given_y
         tally.squares[i] += x * x + y * y

@@ -24,7 +24,7 @@ from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.streams import begin, worlds
 from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by, put_out
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
@@ -276,7 +276,7 @@ class Simulation(Instant):
         self._openings[:] = self._wanted
 
     def _put_out(self, _: int) -> None:
-        self._openings[:] = put_out(self.sensors, self.ticks, self._openings)
+        self._openings[:] = self.sensors.put_out(self.ticks, self._openings)  # type: ignore[attr-defined]
 
     def _follow(self, _: int) -> None:
         self._seen[at.REFERENCE : at.REFERENCE + 8] = self.trajectory.sample(self.time)

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import knowledge, stage
+from baselines.admittance import knowledge, law
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, check_gains, require_stiffness
@@ -162,8 +162,8 @@ class AdmittanceController(StagedController):
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )  # fmt: skip
         constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
-        law = LawStage(stage.control, constants, knowledge.fresh_memory(rig, sampled))
-        return [inertial.law_stage(rig), law] if inert else [law]
+        own = LawStage(law.control, constants, knowledge.fresh_memory(rig, sampled))
+        return [inertial.law_stage(rig), own] if inert else [own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         require_stiffness(reference, 0.0)

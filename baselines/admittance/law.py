@@ -1,4 +1,4 @@
-"""A stiff loop that follows a reference motion through friction, as a kernel over lanes.
+"""A stiff loop that follows a reference motion through friction, as a stage of the closed loop.
 
 The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
     j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
@@ -15,16 +15,19 @@ with the forces unseen of ``knowledge``: believed friction and what an observer 
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
-from baselines.admittance.rows import Follower, Gains, Known, Memory, Watch
+from baselines.admittance import knowledge
+from baselines.admittance.rows import Constants, Follower, Gains, Known, Memory, Watch
 from baselines.backstepping.cartesian_law import across, along, load_rates
 from baselines.estimation.half_wave import sustained
 from baselines.estimation.rows import Belief
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Motion
+from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.dynamics import load
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
@@ -89,7 +92,7 @@ def jerk_for(acceleration: float, speed: float, position: float, c: float) -> fl
 
 @helper
 def beyond(error: float, zone: float) -> float:
-    """What of ``error`` exceeds +-``zone``."""
+    """What of ``error`` exceeds +-``zone``: a dead zone keeps integral action from hunting against stiction."""
     return error - max(-zone, min(zone, error))
 
 
@@ -154,3 +157,14 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         p2, n2 = pressure_openings(rate2, stiffness[1, i], stiffness_rate[1, i], c4, second, p)
         for valve, wanted in ((0, p1), (1, n1), (2, p2), (3, n2)):
             seen.opening[valve, i] = lead(wanted, memory.chambers.spool[valve, i], kept, gains.quickness)
+
+
+@kernel
+def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    """One control period of a block; returns how many stiffness setpoints are not positive definite."""
+    signals, known = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n])
+    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+    missed = knowledge.know(signals, own, known, about)
+    command(signals, own, known, about.gains, about.belief)
+    load(signals.opening, 0, n, own.chambers.opening)
+    return missed

@@ -96,7 +96,7 @@ def evaluate_worlds(
     **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
-    if arguments.get("device") is not None:  # type: ignore[typeddict-item]
+    if arguments.get("device") is not None:
         said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
         raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]
     result, law, first = Evaluation(name), controller_of(controller), 0

@@ -18,6 +18,7 @@ from birthsim_env.outcome import Ends
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.compiled.records import Numbers, number, part, row, rows
+from birthsim_env.physics.dynamics import load
 from birthsim_env.simulation import Simulation
 
 DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
@@ -71,8 +72,7 @@ def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
             for axis in range(2):
                 errors[number // every, axis, i] = now.tracking_error[axis, i]
         world.impact[0, i], world.impact[1, i] = 0.0, 0.0
-        for k in range(4):
-            own.command[k, i] = seen.opening[k, i]
+    load(seen.opening, 0, n, own.command)
     sample(now, own.command, about.limits.period, own, kept, n)
     return 0
 
@@ -88,8 +88,6 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
         for k in range(len(DISCOUNTS)):
             own.returns[k, i] += own.weight[k, i] * paid
             own.weight[k, i] *= about.discounts[k]
-        for k in range(4):
-            own.last[k, i] = own.command[k, i]
         if failed[i] > 0.0:
             own.alive[i], own.fallen[i] = 0.0, 1.0
             for k in range(STATES):
@@ -97,6 +95,7 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
             for k in range(4):
                 world.motion.rows[k, i] = own.motion[k, i]
         own.success[i] = ends.success[i] * own.alive[i]
+    load(own.command, 0, n, own.last)
     return 0
 
 

@@ -15,7 +15,7 @@ WORDS, OUT = POOL + 2, 2 * POOL
 @helper
 def _words(room: Array, rows: int) -> Words:
     """Room for numbers as room for words of 32 bits, (rows, BLOCK)."""
-    return carray(pointer(np.int64(room.ctypes.data), np.uint32), (rows, BLOCK))
+    return carray(pointer(int(room.ctypes.data), np.uint32), (rows, BLOCK))
 
 
 @helper

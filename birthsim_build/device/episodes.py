@@ -60,7 +60,7 @@ class DeviceEpisodes(Episodes):
         named, words = Start(start), Start(start.view(np.int64))
         words.seed[:], words.episode[:] = self._entropy[chosen], self._numbers[chosen]
         if position is not None:
-            named.elsewhere[:], named.place[0], named.place[1] = 1.0, *position.tolist()
+            named.elsewhere[:], named.place[0], named.place[1] = 1.0, float(position[0]), float(position[1])
         self._lanes.begin(chosen, start)
         self.elapsed[chosen] = 0
 

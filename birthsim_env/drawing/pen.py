@@ -8,6 +8,8 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from birthsim_env.physics.rig.parameters import Air
+
 Point = tuple[float, float]
 Colour = tuple[int, int, int]
 
@@ -39,11 +41,19 @@ def mix(low: Colour, high: Colour, fraction: float) -> Colour:
     if math.isnan(fraction):
         return STEEL
     fraction = min(max(fraction, 0.0), 1.0)
-    return (
-        round(low[0] + fraction * (high[0] - low[0])),
-        round(low[1] + fraction * (high[1] - low[1])),
-        round(low[2] + fraction * (high[2] - low[2])),
-    )
+    red, green, blue = (round(a + fraction * (b - a)) for a, b in zip(low, high, strict=True))
+    return red, green, blue
+
+
+def pressure_fraction(pressure: float, air: Air) -> float:
+    """0 at atmospheric pressure, 1 at supply pressure."""
+    low, high = air.atmospheric_pressure, air.supply_pressure
+    return float(pressure - low) / (high - low)
+
+
+def pressure_colour(pressure: float, air: Air) -> Colour:
+    """Colour of air at an absolute pressure, Pa."""
+    return mix(LOW_PRESSURE, HIGH_PRESSURE, pressure_fraction(pressure, air))
 
 
 def number(value: float, form: str) -> str:

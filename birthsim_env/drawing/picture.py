@@ -80,7 +80,7 @@ class Picture:
         picture, magnifier, end_effector = self.surface, self._panel.magnifier, self._view.end_effector(scene)
         window = magnifier.window(scene.compliant_target, (scene.target, end_effector))
         picture.blit(self._background, (0, 0))
-        self._view.draw(picture, scene, self._panel.colour, window)
+        self._view.draw(picture, scene, window)
         magnifier.draw(picture, scene, end_effector, window, self._view.scale)
         self._panel.draw_pressures(picture, scene.pressures)
         self._write_header(scene, end_effector)

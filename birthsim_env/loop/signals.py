@@ -91,10 +91,10 @@ class Reference(Motion, Setpoints):
 
 
 @helper
-def given_way(reference: Reference, force: Array, i: int) -> tuple[float, float]:
-    """What a force (2, N), N, displaces the compliant target of lane ``i`` by (19), m."""
+def given_way(reference: Reference, fx: float, fy: float, i: int) -> tuple[float, float]:
+    """What a force, N, displaces the compliant target of lane ``i`` by (19), m."""
     kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
-    return compliance(force[0, i], force[1, i], kx, ky, kxy)
+    return compliance(fx, fy, kx, ky, kxy)
 
 
 REFERENCE_NAMES = tuple(name for name, *_ in Reference.entries())

@@ -196,7 +196,7 @@ def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float
 
 @helper
 def copy(source: Array, target: Array, n: int) -> None:
-    """Copy the rows of ``n`` lanes."""
+    """Copy as many rows of ``n`` lanes as ``target`` has."""
     for row in range(target.shape[0]):
         for i in range(n):
             target[row, i] = source[row, i]

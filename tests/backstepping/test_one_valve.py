@@ -5,9 +5,7 @@ import pytest
 from scipy.optimize import fsolve
 
 from baselines import BacksteppingController
-from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES
-from baselines.registry import make_controller
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.backstepping.test_backstepping import as_signals, random_situations
@@ -76,14 +74,3 @@ def test_pressures_settle_where_leakage_balances() -> None:
     assert settled.max() < 6.5e5
     moved = plant.end_effector()[:2] - rest
     np.testing.assert_allclose(8.0 / moved[0], 2000.0, rtol=0.01)
-
-
-def test_on_the_circle_the_error_is_that_of_two_valves() -> None:
-    """A part of the Circle, with friction: the same error, and more air, since a valve that fills also drains."""
-    two, one = (
-        evaluate("BirthSIM/Circle-v1", make_controller(name, Parameters()), name, 1, 0, progress=False, duration=2.5).summary()
-        for name in ("backstepping-weight", "backstepping-one-valve")
-    )
-    for axis in "xy":
-        assert one[f"settled_rms_{axis}"]["median"] == pytest.approx(two[f"settled_rms_{axis}"]["median"], rel=0.05)
-    assert 1.0 < one["air"]["median"] / two["air"]["median"] < 1.4

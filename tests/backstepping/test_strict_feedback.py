@@ -6,21 +6,13 @@ import sympy as sp
 
 from birthsim_env import Parameters
 from studies.verification.strict_feedback import neglected_acceleration, strict_feedback_rates
+from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 
-RIGS = {
-    "default": Parameters(),
-    "other": Parameters().replace(
-        {
-            **{"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.1},
-            **{"cylinder2.rod_diameter": 0.012, "cylinder1.viscous_friction": 55.0, "air.polytropic_index": 1.3},
-        }
-    ),
-}
 LANES = 40
 
 
-@pytest.fixture(scope="module", params=RIGS.values(), ids=RIGS.keys())
+@pytest.fixture(scope="module", params=[Parameters(), closed_loop.ANOTHER], ids=["default", "another rig"])
 def case(request):
     """A rig, random sliding states with their chamber pressures and flows, X and U."""
     rig, rng = request.param, np.random.default_rng(3)

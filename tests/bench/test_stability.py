@@ -2,71 +2,19 @@
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 
 from baselines.bench.pieces import controller_settings
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.stability import maps as stability
-from studies.stability.figure import _border, _edges, _places, stability_figure
-from studies.stability.maps import (
-    MAPS,
-    MOST_FORCE,
-    MOST_MOTION,
-    Axis,
-    Cases,
-    Map,
-    Window,
-    describe_map,
-    judge,
-    stability_tasks,
-    stable_up_to,
-)
+from studies.stability.figure import stability_figure
+from studies.stability.maps import MAPS, Axis, Cases, Map, Window, describe_map, judge, stability_tasks, stable_up_to
 from tests.console import OWN, call, strict
 
 RIG = Parameters()
-
-
-def corners(name: str, rig: Parameters = RIG, points: int = 2) -> dict[str, Any]:
-    settings = controller_settings("admittance-backstepping", rig)
-    tasks = stability_tasks([name], settings, "ideal", points, 0)
-    return {
-        **describe_map(name, rig, points),
-        "variants": {label: task.work(**task.settings) for (_, label), task in tasks.items()},
-    }
-
-
-@pytest.mark.slow
-def test_the_corners_of_the_rigs_map() -> None:
-    """Fixed gains oscillate on a light rig with slow valves; those that yield come to rest, there but for half a millimetre."""
-    chart = corners("rig")
-    assert (chart["x"]["values"], chart["y"]["values"], chart["believed"]) == ([1.0, 12.0], [1.5, 6.0], [4.0, 3.0])
-    found = {label: variant["stable"] for label, variant in chart["variants"].items()}
-    motion = {label: variant["motion_mm"] for label, variant in chart["variants"].items()}
-    assert found["as it is"][0][0]
-    assert found["as it is"][1] == [True, True]
-    assert motion["as it is"][0][1] < 1
-    assert found["gains that never yield"] == [[True, False], [True, True]]
-    assert motion["gains that never yield"][0][1] > 10
-    assert stable_up_to(chart, "gains that never yield") == [1.0, 12.0]
-
-
-@pytest.mark.slow
-def test_what_is_stable_with_a_hand() -> None:
-    """Less than 0.5 mm and 5 N; friction that is fed forward but not there drives a stiff hand, half of it less so."""
-    chart = corners("hand_friction", points=3)
-    hand, found = np.array(chart["x"]["values"]), chart["variants"]
-    for variant in found.values():
-        motion, stable = 1e-3 * np.array(variant["motion_mm"]), np.array(variant["stable"])
-        assert np.array_equal(stable, (motion < MOST_MOTION) & (hand * motion < MOST_FORCE))
-    assert not found["as it is"]["stable"][0][2]
-    assert np.all(np.array(found["as it is"]["stable"])[:, 0])
-    assert np.all(np.array(found["as it is"]["stable"])[1:])
-    assert found["half the friction fed forward"]["motion_mm"][0][2] < found["as it is"]["motion_mm"][0][2]
 
 
 def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,42 +37,14 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pyte
     verdict = judge(Cases([RIG, RIG], np.array([0.0, 30000.0]), np.full(2, 2000.0)), make_controller(f"{own}:Out", RIG))
     assert verdict.lost.tolist() == [True, False]
     assert not verdict.stable[0]
-    monkeypatch.setitem(MAPS, "hand", Map("pushed out", *small_axes(), MAPS["hand"].cases, lambda rig: (None, None)))
+    hand, asked = Axis("hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
+    monkeypatch.setitem(MAPS, "hand", Map("pushed out", hand, asked, MAPS["hand"].cases, lambda rig: (None, None)))
     (((key, label), task),) = stability_tasks(["hand"], controller_settings(f"{own}:Out", RIG), "ideal", None, 0).items()
     assert label == f"{own}:Out"
     chart = {**describe_map(key, RIG), "variants": {label: task.work(**task.settings)}}
     assert np.isnan(chart["variants"][f"{own}:Out"]["motion_mm"][0][0])
     stability_figure("own", chart, "with a file of one's own", tmp_path)
     assert "lost: ran into a stop" in "".join(re.findall("<!-- (.*?) -->", (tmp_path / "stability_own.svg").read_text()))
-
-
-def small_axes() -> tuple[Axis, Axis]:
-    return Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
-
-
-def test_axes_and_edges_of_cells() -> None:
-    """Even or by equal factors; edges halfway, also beyond the ends."""
-    np.testing.assert_allclose(Axis("", 1.0, 7.0, 4).values(), [1, 3, 5, 7])
-    np.testing.assert_allclose(Axis("", 1.0, 1000.0, 9, True).values(4), [1, 10, 100, 1000])
-    np.testing.assert_allclose(_edges(np.array([1.0, 3, 5]), False), [0, 2, 4, 6])
-    np.testing.assert_allclose(_edges(np.array([1.0, 100, 10000]), True), [0.1, 10, 1000, 100000])
-    np.testing.assert_allclose(_edges(np.array([2.0]), False), [1.5, 2.5])
-
-
-def test_a_logarithmic_side_begins_at_none() -> None:
-    """A logarithm has no zero: the first cell stands a factor before the second, and its tick says 0."""
-    values = [0.0, 100.0, 1000.0]
-    np.testing.assert_allclose(_places({"values": values, "logarithmic": True}), [10, 100, 1000])
-    np.testing.assert_allclose(_places({"values": values, "logarithmic": False}), values)
-
-
-def test_the_border_runs_between_stable_cells_and_others() -> None:
-    figure, axes = plt.subplots()
-    _border(axes, np.arange(4.0), np.arange(3.0), np.array([[True, True, False], [True, False, False]]))
-    upright, level = ({tuple(map(tuple, path.vertices)) for path in lines.get_paths()} for lines in axes.collections)
-    assert upright == {((2.0, 0.0), (2.0, 1.0)), ((1.0, 1.0), (1.0, 2.0))}
-    assert level == {((1.0, 1.0), (2.0, 1.0))}
-    plt.close(figure)
 
 
 def test_how_far_all_is_stable() -> None:

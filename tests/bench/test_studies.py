@@ -14,16 +14,7 @@ from birthsim_env.physics.geometry import inverse_geometry, joint_force
 from birthsim_env.physics.plant import Plant
 from studies.comparison import stiffness as studies
 from studies.comparison import stiffness_figures as study_figures
-from studies.comparison.stiffness import (
-    COUPLED,
-    STUDIES,
-    disturbance_study,
-    ellipse_study,
-    frictionless,
-    polar_study,
-    stiffness_study,
-    study_tasks,
-)
+from studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study
 
 RIG = Parameters()
 SMOOTH = frictionless(RIG)
@@ -85,26 +76,6 @@ def test_ellipse_study_recovers_any_matrix_and_marks_a_lost_pose(spring):
     for k in (0, 2):
         np.testing.assert_allclose(result["stiffness"][k], spring["stiffness"])
     np.testing.assert_array_equal(spring["probes"].stiffness[:, 0], [3000, 1500, 800])
-
-
-def test_on_the_frictionless_rig_ellipses_are_the_setpoint_where_it_does_not_couple_the_axes():
-    result = told(ellipse_study, SMOOTH, poses=((0.4, 0.05), (0.5, -0.015)), setpoint=((2000.0, 0.0), (0.0, 2000.0)))
-    for matrix in result["stiffness"]:
-        np.testing.assert_allclose(matrix, np.diag([2000.0, 2000.0]), rtol=0, atol=20)
-    # (18) drops the coupling: the law renders a matrix that is a fifth of the setpoint's norm off.
-    coupled = told(ellipse_study, SMOOTH, poses=((0.4, 0.05),), setpoint=COUPLED)["stiffness"][0]
-    assert 0.15 < np.linalg.norm(np.array(coupled) - COUPLED) / np.linalg.norm(COUPLED) < 0.4
-
-
-def test_studies_of_all_controllers_and_disturbances_of_the_law_alone():
-    tasks = study_tasks([{"controller": name, "source": "", "rig": RIG.to_dict()} for name in ("backstepping", "pid")], RIG)
-    assert set(tasks) == {(study, name) for study in STUDIES for name in ("backstepping", "pid")} | {
-        ("disturbance", f"backstepping, {label}") for label in ("with friction", "frictionless")
-    }
-    assert len({task.name for task in tasks.values()}) == len(tasks)
-    smooth = tasks["disturbance", "backstepping, frictionless"].settings["rig"]
-    assert smooth["cylinder1"]["coulomb_friction"] == smooth["cylinder2"]["coulomb_friction"] == 0
-    assert smooth["cylinder1"]["viscous_friction"] == 35
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.0), (0.0, -40.0), (30.0, 20.0)])

@@ -16,6 +16,7 @@ from birthsim_build.code.compiler import LEAST_LLVM
 from birthsim_build.code.elf import contents_of
 from birthsim_build.code.targets import HOST
 from birthsim_build.commands import build as loops
+from birthsim_build.device.machine import machine_named
 
 BUILT = (
     "--controller", "admittance-backstepping", "limited:pid", "--policy", "circle", "circle_honest_student",
@@ -48,6 +49,14 @@ def need_threads():
     """Skip where the threads of a GPU cannot be run by this processor."""
     if HOST is None or llvm_version_info[0] < LEAST_LLVM:
         pytest.skip(f"needs Linux on x86-64 or aarch64, and LLVM {LEAST_LLVM}")
+
+
+def need_device(name):
+    """Skip where there is no such device."""
+    try:
+        machine_named(name)
+    except ValueError as missing:
+        pytest.skip(str(missing))
 
 
 def build(target, out, *options, command=loops):

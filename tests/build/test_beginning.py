@@ -17,7 +17,7 @@ from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.references import Circle
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.build.targets import need_threads
+from tests.build.targets import need_device, need_threads
 from tests.build.test_device import assert_equal, assert_same_run
 from tests.build.test_threads import assert_exact
 
@@ -47,10 +47,12 @@ def made(device, case, lanes, **more):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("device", ["host", "cuda"])
 @pytest.mark.parametrize("case", CASES)
-def test_episodes_begin_with_the_bits_of_the_native_environment(case):
+def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
     need_threads()
-    envs = [made(device, case, 33, max_episode_steps=3) for device in (None, "host")]
+    need_device(device)
+    envs = [made(where, case, 33, max_episode_steps=3) for where in (None, device)]
     assert_same_run(*envs, 8, staggered=True)
     # Anywhere, by seeds of 64 bits, and again by the seeds of before.
     for given in ({"seed": [2**64 - 1 - k for k in range(33)]}, {"options": {"position": (0.51, 0.01)}}):

@@ -67,8 +67,6 @@ def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
     assert max(about["rows"].values()) < words[threads.ROWS]
 
 
-def test_only_a_cubin_needs_a_gpu(tmp_path, monkeypatch, capsys):
-    _, _, complained = call("export", monkeypatch, capsys, "--to", "ptx", "--gpu", "sm_90", "--out", tmp_path / "out")
-    assert complained == "birthsim export: error: --gpu with ptx; allowed: with cubin\n"
+def test_a_gpu_is_named_by_its_architecture(tmp_path):
     with pytest.raises(ValueError, match="gpu = 'h100'; allowed: sm_"):
         ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "h100")

@@ -42,10 +42,7 @@ class Unit:
         self._numbers = {variable.name: variable.valueReference for variable in about.modelVariables}
         self.folder, self.ticks = fmpy.extract(path), 0
         self.two = about.fmiVersion == "2.0"
-        kind = fmpy.fmi2.FMU2Slave if self.two else fmpy.fmi3.FMU3Slave
-        name = about.coSimulation.modelIdentifier
-        self.unit = kind(guid=about.guid, unzipDirectory=self.folder, modelIdentifier=name, instanceName="one")
-        self.unit.instantiate()
+        self.unit = fmpy.instantiate_fmu(self.folder, about, "CoSimulation")
         if self.two:
             self.unit.setupExperiment(startTime=0.0)
         self.unit.enterInitializationMode()

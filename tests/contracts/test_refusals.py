@@ -28,25 +28,26 @@ NAN, INF = math.nan, math.inf
 RIG = Parameters()
 
 
-def environment(**given):
-    return gymnasium.make(CIRCLE, **given)
+def named(controller):
+    return make_controller(controller, RIG)
 
 
-def lanes(**given):
-    return gymnasium.make_vec(CIRCLE, num_envs=2, **given)
-
-
-def itself(**given):
-    """Without ``gymnasium.make``, which warns of a render mode first."""
-    return BirthSIMEnv("circle", **given)
-
-
-def lanes_themselves(**given):
-    return BirthSIMVectorEnv("circle", **given)
+environment = partial(gymnasium.make, CIRCLE)
+lanes = partial(gymnasium.make_vec, CIRCLE, num_envs=2)
+itself, lanes_themselves = partial(BirthSIMEnv, "circle"), partial(BirthSIMVectorEnv, "circle")
+"""Without ``gymnasium.make``, which warns of a render mode first."""
+residual_environment = partial(gymnasium.make, "BirthSIM/CircleResidual-v1")
+residual_lanes = partial(gymnasium.make_vec, "BirthSIM/CircleResidual-v1", num_envs=2)
+gains = partial(make_controller, "admittance[learn=false]", RIG)
+evaluation = partial(evaluate, PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False)
+linear = partial(linearize, None, (0.5, 0.0))
+limits = partial(PortLimiter, named("shut-valves"), RIG)
+score = partial(normalized_score, environment=CIRCLE, score=1.0)
+training, residual = partial(override, TrainingSettings()), partial(override, ResidualSettings())
 
 
 def ranges(**given):
-    return gymnasium.make(CIRCLE, randomize=given)
+    return environment(randomize=given)
 
 
 def options(**given):
@@ -57,48 +58,8 @@ def rig(**given):
     return RIG.replace(given)
 
 
-def named(controller):
-    return make_controller(controller, RIG)
-
-
-def gains(**given):
-    return make_controller("admittance[learn=false]", RIG, **given)
-
-
 def listed_option(controller, **given):
-    return make_controller(f"{controller}[{','.join(f'{name}={value}' for name, value in given.items())}]", RIG)
-
-
-def evaluation(**given):
-    return evaluate(PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False, **given)
-
-
-def linear(**given):
-    return linearize(None, (0.5, 0.0), **given)
-
-
-def limits(**given):
-    return PortLimiter(named("shut-valves"), RIG, **given)
-
-
-def residual_environment(**given):
-    return gymnasium.make("BirthSIM/CircleResidual-v1", **given)
-
-
-def residual_lanes(**given):
-    return gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=2, **given)
-
-
-def score(**given):
-    return normalized_score(**{"environment": CIRCLE, "score": 1.0, **given})
-
-
-def training(**given):
-    return override(TrainingSettings(), **given)
-
-
-def residual(**given):
-    return override(ResidualSettings(), **given)
+    return named(f"{controller}[{','.join(f'{name}={value}' for name, value in given.items())}]")
 
 
 def hand(kind, *fixed, **given):
@@ -220,11 +181,6 @@ TABLE = [
     (training, "environment", (3,), "the id of a residual environment"),
     (residual, "smoothing", (0.3,), "law, impedance, authority, "),
     (residual, "weight_compensation", (True,), "law, impedance, authority, "),
-    (residual, "law", ("pid",), "'backstepping', "),
-    (residual, "impedance", ("soft",), "'fixed', 'variable_kp', 'variable'"),
-    (partial(residual, law="none"), "impedance", ("variable",), "'fixed', law = 'none' has no impedance to vary"),
-    (residual, "authority", (0, 501, True), "more than 0, at most 500"),
-    (residual, "time_constant", (0,), "more than 0, at most 1"),
     (Circle, "period", (0,), "other than zero"),
     (path, "length", (-0.05, (-0.05, 0.1)), ">= 0"),
     (partial(path, angle=1.0), "radius", (0.0, (-0.1, 0.1), (0.08, 0.06)), ">= 0.001"),
@@ -268,7 +224,7 @@ TABLE = [
 
 def title(call):
     inner = call.args[0] if isinstance(call, partial) and call.args else getattr(call, "func", call)
-    return getattr(inner, "__name__", inner)
+    return getattr(inner, "__name__", inner if isinstance(inner, str) else type(inner).__name__)
 
 
 CASES = [

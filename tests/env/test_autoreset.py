@@ -48,12 +48,6 @@ def test_a_lane_waits_for_its_reset_where_autoreset_is_disabled():
     env.step(SLAM)
 
 
-def test_reset_and_step_say_the_same_things():
-    single, lanes = gymnasium.make(PROBE), make()
-    assert single.reset(seed=0)[1].keys() == single.step(np.zeros(4))[4].keys()
-    assert lanes.reset(seed=0)[1].keys() == lanes.step(0 * SLAM)[4].keys()
-
-
 def test_rounding_in_single_precision_is_no_error():
     env = gymnasium.make(PROBE)
     env.reset(seed=0)

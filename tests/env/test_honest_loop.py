@@ -11,8 +11,6 @@ from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.plant import Plant
 from studies.haptics.worlds import no_hand, resting
 from studies.stability.rig_port import RigPort
 from tests.env.test_loop import OwnValves, assert_same, course, own
@@ -113,19 +111,6 @@ def test_a_clock_that_jitters_puts_out_the_mean_of_both_openings_over_the_period
     # Kolmogorov's bound at one in a thousand.
     apart = np.abs(np.sort(fractions) / 0.4 - (np.arange(fractions.size) + 0.5) / fractions.size).max()
     assert apart < 1.95 / np.sqrt(fractions.size)
-
-
-@pytest.mark.parametrize("late", [0.0, 0.25, 0.5, 1.0])
-def test_the_mean_moves_a_spool_as_an_opening_that_comes_late(late):
-    rig = Parameters()
-    period, lag = rig.electronics.control_period, rig.valves.time_constant
-    exact, mean = Plant(rig), Plant(rig)
-    for opening, seconds in ((0.0, late * period), (0.8, (1 - late) * period)):
-        if seconds:
-            exact.advance(np.full((4, 1), opening), np.zeros((2, 1)), seconds)
-    mean.advance(np.full((4, 1), 0.8 * (1 - late)), np.zeros((2, 1)), period)
-    spools = list(at.SPOOLS)
-    assert np.abs(exact.state[spools] - mean.state[spools]).max() <= 0.8 * (period / lag) ** 2 / 8 + 1e-8
 
 
 def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():

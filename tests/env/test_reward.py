@@ -105,30 +105,6 @@ def test_the_terms_are_named_in_order():
     assert not failed.any()
 
 
-PUSH = 40.0
-"""N, at 2000 N/m: 20 mm."""
-
-
-def cost_of(path, period=0.001):
-    """What tracking and hunting cost along positions (T,), m past the target, from a sudden ``PUSH`` on."""
-    owed, cost = np.zeros((4, 1)), 0.0
-    for k, speed in enumerate(np.diff(path, prepend=0.0) / period):
-        motion = [[0.5 + path[k]], [0.0], [speed], [0.0]]
-        terms, _ = assess(1, period, force=[[PUSH], [0.0]], since_jump=[float(k > 0)], owed=lambda _: owed, motion=motion)
-        cost -= LARGEST * float(terms["reward_tracking"][0] + terms["reward_hunting"][0])
-    return cost
-
-
-def test_after_a_jump_it_is_best_to_give_way_with_60_ms():
-    times = 0.001 * np.arange(1, 401)
-    asked = 0.02 * (1 - np.exp(-times / 0.06))
-    assert cost_of(asked) == pytest.approx(0.0, abs=1e-6)
-    hasty, slow, shaken = 0.02 * (1 - np.exp(-times / 0.02)), 0.02 * (1 - np.exp(-times / 0.2)), asked.copy()
-    shaken += 0.005 * np.sin(2 * np.pi * 8 * times) * np.exp(-times / 0.2)
-    for path in (hasty, slow, shaken):
-        assert cost_of(path) > 5.0
-
-
 @pytest.mark.parametrize("period", [0.001, 0.01, 0.05])
 @pytest.mark.parametrize("size", [2, 4, 5])
 def test_no_step_pays_less_than_nothing_nor_more_than_one_per_10_ms(period, size):

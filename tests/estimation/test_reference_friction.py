@@ -130,41 +130,13 @@ def two_lanes(times: Array) -> Array:
     return np.stack([circle(times).T, circle(times + 0.9).T], axis=2)
 
 
-def under_way(until: float, count: int = 1) -> tuple[list[Friction], Array]:
-    """Models that have followed the ellipses for so long, s, and what they said last (2, N)."""
-    models, motion = [Friction(2) for _ in range(count)], np.zeros((8, 2))
-    for wanted in two_lanes(np.arange(0, until, 1e-3)):
-        motion[:4] = wanted
-        drags = [model.update(motion) for model in models]
-    return models, drags[0]
-
-
-@pytest.mark.parametrize("until", [0.2, 0.29, 0.63, 1.0])
-def test_a_forecast_is_what_updates_say_later(until: float) -> None:
-    """Period by period the same, lane by lane; asking changes nothing."""
-    (model, kept), _ = under_way(until, 2)
-    times = until + 1e-3 * np.arange(80)
-    ahead, motion = two_lanes(times), np.zeros((8, 2))
-    found = model.forecast(ahead, np.arange(1, len(ahead) + 1))
-    assert np.array_equal(model.forecast(ahead[:5], np.arange(1, 6)), found[:5])
-    alone = np.ascontiguousarray(ahead[:, :, 1:])
-    single = Friction()
-    for wanted in two_lanes(np.arange(0, until, 1e-3)):
-        motion[:4] = wanted
-        single.update(np.ascontiguousarray(motion[:, 1:]))
-    assert np.array_equal(single.forecast(alone, np.arange(1, len(ahead) + 1))[:, :, 0], found[:, :, 1])
-    for wanted, said in zip(ahead, found, strict=True):
-        motion[:4] = wanted
-        drag = kept.update(motion)
-        assert np.array_equal(model.update(motion), drag)
-        np.testing.assert_allclose(said, drag, rtol=1e-12, atol=1e-12)
-
-
 def test_a_forecast_of_uneven_steps_is_lugre_with_the_speed_at_their_ends() -> None:
     """z + T (v - s0 |v| z / G(v)), never beyond G(v)/s0, with speeds of the linkage made of points."""
     ticks, f = np.array([2, 5, 10, 17, 27, 40, 57]), RIG.friction
     for until in (0.15, 0.27, 0.6, 1.2):
-        (model,), drag = under_way(until)
+        model, motion = Friction(2), np.zeros((8, 2))
+        for motion[:4] in two_lanes(np.arange(0, until, 1e-3)):
+            drag = model.update(motion)
         ahead = two_lanes(until + 1e-3 * (ticks - 1))
         found = model.forecast(ahead, ticks)
         for lane in range(2):

@@ -44,12 +44,12 @@ def targets(lanes=1):
     return resting([(0.5, 0.0)] * lanes, [KX] * lanes)
 
 
-def run(damping, limiter, seconds=6.0, lanes=1):
+def run(damping, limiter, seconds=6.0):
     """A mass on the spring that is asked for, with ``damping`` (N s/m), pushed to and fro: least authority, and at the end."""
     w, place, speed, least = 2 * math.pi * 1.0, 0.0, 0.0, 1.0
     for k in range(round(seconds / T)):
         force = 30.0 * math.sin(w * k * T)
-        limiter.command(seen(k * T, np.full(lanes, place), speed, force), targets(lanes))
+        limiter.command(seen(k * T, np.array([place]), speed, force), targets())
         least = min(least, float(limiter.authority.min()))
         speed += T * (force - damping * speed - KX * place) / MASS
         place += T * speed

@@ -9,9 +9,9 @@ import threading
 import time
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 
-ROOT = Path(__file__).parent.parent.parent
+from tests.console import ROOT
+
 NAMES = (
     *("chromium", "chromium-browser", "chromium-headless-shell", "headless_shell", "chrome-headless-shell"),
     *("google-chrome", "google-chrome-stable", "google-chrome-beta", "google-chrome-unstable", "chrome"),
@@ -35,15 +35,10 @@ with sync_playwright() as playwright:
 """
 INSTALLATION = "apt-get install chromium-headless-shell, or .venv/bin/playwright install chromium"
 FONT = "Liberation Sans"
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+ARGUMENTS = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync"),
+)
 WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 400, "height": 800}
 CALM = "?controller=admittance-backstepping"
 """What a page's address asks for so that the end effector comes to rest; the paper's law hunts."""
@@ -94,10 +89,10 @@ class Server:
 
     def __init__(self, command, *arguments, port=0):
         line = [sys.executable, "-m", "birthsim", *command.split(), *map(str, arguments), "--port", str(port)]
-        self._process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         said = []
         # It names its address once it listens; a process that fails closes the pipe.
-        for text in self._process.stdout:
+        for text in self.process.stdout:
             said.append(text)
             if found := re.search(r"http://[^/\s]+:(\d+)", text):
                 self.url, self.port = f"{found[0]}/", int(found[1])
@@ -110,7 +105,7 @@ class Server:
 
     def __exit__(self, *_):
         """Ends by the signal that service managers send; whoever does not listen is killed."""
-        with self._process as process:
+        with self.process as process:
             process.terminate()
             try:
                 process.communicate(timeout=PATIENCE)
@@ -181,7 +176,8 @@ class Window:
         end = time.monotonic() + seconds
         while not (found := self._value_by_now(expression)):
             if time.monotonic() > end:
-                raise AssertionError(f"never within {seconds} s: {expression}; last seen {found!r}; {self.value('birthsim')}")
+                seen = self.value("[birthsim.frame, birthsim.settings, birthsim.state]")
+                raise AssertionError(f"never within {seconds} s: {expression}; last seen {found!r}; {seen}")
             self.page.wait_for_timeout(30)
         return found
 
@@ -218,17 +214,17 @@ class Window:
         self.page.locator("#back").click()
         self.wait("birthsim.hello.mode === 'live'")
 
-    def end_effector(self):
-        """Where the end effector is in the window, px."""
-        return self.value("birthsim.pixel(birthsim.frame.position)")
+    def end_effector(self, rig=0):
+        """Where the end effector of the first or the second rig is in the window, px."""
+        return self.value(f"birthsim.pixel(birthsim.frame{'.second' * rig}.position, {rig})")
 
     def live(self, seconds):
         """Wait until the rig has lived through so many seconds of its own time."""
         self.wait(f"birthsim.frame.time > {self.frame()['time'] + seconds}")
 
-    def hold(self, across=0.0, up=0.0):
+    def hold(self, across=0.0, up=0.0, rig=0):
         """Press the mouse on the end effector and pull it by (across, up) px."""
-        x, y = self.end_effector()
+        x, y = self.end_effector(rig)
         mouse = self.page.mouse
         mouse.move(x, y)
         mouse.down()

@@ -35,7 +35,7 @@ def test_without_a_browser_the_last_line_says_so_and_in_ci_it_fails(ci, tmp_path
     line = [sys.executable, "-m", "pytest", "-n1", "-p", "hidden", "-p", "no:cacheprovider", "-k", "slow_motion"]
     given = {name: value for name, value in os.environ.items() if name != "CI" and not name.startswith("PYTEST_")}
     given |= {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])} | ({"CI": "true"} if ci else {})
-    line.append("tests/live/page/test_page.py")
+    line.append("tests/live/page/test_access.py")
     done = subprocess.run(line, cwd=ROOT, env=given, capture_output=True, text=True, check=False)
     assert (done.returncode != 0) == ci, done.stderr
     if ci:

@@ -1,4 +1,4 @@
-"""A user's own reference and hand: functions, files and classes; CSV files, whose heading says which column is which."""
+"""A user's own reference and hand: functions, files and classes; what a hand is asked, and when; columns of CSV files."""
 
 import math
 
@@ -132,29 +132,6 @@ def test_a_heading_names_the_columns_in_any_order(text, names, tmp_path):
     np.testing.assert_array_equal(found, [[0.0, 1.0, -2.0], [1.0, 3.0, -4.0]])
 
 
-WRONG = {
-    "milliseconds": ("time_ms,Fx,Fy\n0,1,2\n1,1,2\n", "", "'time'"),
-    "another unit": ("time (ms),Fx,Fy\n0,1,2\n1,1,2\n", "", "'time' in ms, not in s"),
-    "kilonewtons": ("time,Fx [kN],Fy\n0,1,2\n1,1,2\n", "", "'Fx' in kN, not in N"),
-    "twice": ("time,Fx,Fx,Fy\n0,1,2,3\n1,1,2,3\n", "", "'Fx' 2 times"),
-    "semicolons": ("time;Fx;Fy\n0;1;2\n1;1;2\n", "", "separated by commas"),
-    "too few names": ("t,a,b\n0,1,2\n1,1,2\n", ":t,a", "one for each of"),
-    "a name that is not there": ("t,a,b\n0,1,2\n1,1,2\n", ":t,a,d", "'d' 0 times"),
-    "names without a heading": ("0,1,2\n1,1,2\n", ":t,a,b", "t, a, b"),
-    "a short line": ("time,Fx,Fy\n0,1,2\n1,1\n", "", "line 3"),
-    "time that goes back": ("Fx,time,Fy\n0,1,2\n1,0.5,2\n", "", "line 3"),
-}
-
-
-@pytest.mark.parametrize(("text", "names", "allowed"), WRONG.values(), ids=WRONG)
-def test_what_a_file_does_not_say_is_refused(text, names, allowed, tmp_path):
-    (tmp_path / "push.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match="user_force = ") as caught:
-        columns("user_force", csv_file(f"{tmp_path}/push.csv{names}"), FORCE, tuple(FORCE))
-    assert allowed in str(caught.value)
-    assert "allowed: " in str(caught.value)
-
-
 def test_a_stiffness_needs_no_course_beside_it_once_it_is_named(tmp_path):
     (tmp_path / "own.csv").write_text("stiffness,time\n1000,0\n2000,1\n", encoding="utf-8")
     file = csv_file(tmp_path / "own.csv")
@@ -168,3 +145,80 @@ def test_a_hand_of_a_file_pushes_as_it_says_between_its_rows_too(tmp_path):
     env = gymnasium.make(CIRCLE, user_force=f"{tmp_path}/push.csv", policy_period=1.0)
     env.reset(seed=0)
     np.testing.assert_allclose(env.step(np.zeros(4))[4]["user_force"], [10.0, -0.1])
+
+
+class Spy(UserForce):
+    """Remembers what it was asked and answers with what ``law`` makes of it."""
+
+    def __init__(self, law, closed_loop=False):
+        self.law, self.closed_loop, self.asked = law, closed_loop, []
+
+    def force(self, time, position, velocity):
+        self.asked.append((time.copy(), position.copy(), velocity.copy()))
+        return self.law(time, position, velocity)
+
+
+def wave(time, position, velocity):
+    return np.stack([20 * np.sin(40 * time), 10 * np.cos(30 * time)], axis=1)
+
+
+def test_an_open_force_is_asked_once_per_policy_step_with_its_control_instants():
+    spy = Spy(wave)
+    env = gymnasium.make("BirthSIM/Probe-v2", user_force=spy).unwrapped
+    _, first = env.reset(seed=0)
+    infos = [first] + [env.step(np.zeros(4))[4] for _ in range(5)]
+    assert len(spy.asked) == 6
+    for step, (time, position, velocity) in enumerate(spy.asked):
+        np.testing.assert_allclose(time, 0.01 * step + 0.001 * np.arange(10)[:, None], atol=1e-12)
+        np.testing.assert_array_equal(position[:, 0], infos[step]["position"])
+        np.testing.assert_array_equal(velocity[:, 0], infos[step]["velocity"])
+        np.testing.assert_allclose(infos[step]["user_force"], wave(time, None, None)[0, :, 0])
+    # Every sample was held for its own control period: the plant alone, given the same samples, ends in the same state.
+    again = gymnasium.make("BirthSIM/Probe-v2", user_force=Spy(wave), policy_period=0.001).unwrapped
+    again.reset(seed=0)
+    for _ in range(50):
+        again.step(np.zeros(4))
+    np.testing.assert_array_equal(env.simulation.plant.state, again.simulation.plant.state)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_a_closed_loop_force_is_asked_every_control_period_with_the_present_motion(sensors):
+    wall = 0.502
+
+    def spring(time, position, velocity):
+        push = np.minimum(wall - position[0], 0.0) * 3000.0 - 20.0 * velocity[0]
+        return np.stack([push, np.zeros_like(push)])[None]
+
+    spy = Spy(spring, closed_loop=True)
+    env = gymnasium.make("BirthSIM/Probe-v2", user_force=spy, sensors=sensors).unwrapped
+    env.reset(seed=0)
+    plant, states = env.simulation.plant, []
+    for _ in range(30):
+        # A valve that fills chamber P2 drives the end effector into the virtual wall.
+        info = env.step((0.0, 0.0, 0.15, -0.15))[4]
+        states.append((env.simulation.time[0], *plant.end_effector()[:, 0]))
+    assert len(spy.asked) == 301
+    np.testing.assert_allclose([time.item() for time, _, _ in spy.asked], 0.001 * np.arange(301), atol=1e-12)
+    for k, (time, *motion) in enumerate(states):
+        asked = spy.asked[10 * (k + 1)]
+        np.testing.assert_allclose(asked[0].item(), time)
+        np.testing.assert_array_equal(np.concatenate(asked[1:])[:, 0], motion)
+    np.testing.assert_allclose(info["user_force"], spring(None, *spy.asked[-1][1:])[0, :, 0])
+    assert info["position"][0] > wall
+    assert info["user_force"][0] < -1.0
+
+
+def test_a_force_may_answer_with_one_array_that_it_fills_anew():
+    buffer = np.zeros((10, 2, 1))
+
+    def law(time, position, velocity):
+        buffer[:, 0] = np.where(time > 0.4995, 30.0, 0.0)
+        return buffer
+
+    jumps = []
+    for answer in (law, lambda *arguments: law(*arguments).copy()):
+        env = gymnasium.make("BirthSIM/Probe-v2", user_force=Spy(answer))
+        env.reset(seed=0)
+        jumps.append([env.step(np.zeros(4))[4]["since_jump"] for _ in range(60)])
+    np.testing.assert_array_equal(*jumps)
+    assert jumps[0][49] == pytest.approx(0.0, abs=1e-9)

@@ -1,6 +1,7 @@
-"""The documentation site: every page has its place, the generated parts know everything, tables sort, and it builds."""
+"""The documentation site: pages have their places, generated parts know everything, tables sort, it builds, prose is read."""
 
 import csv
+import json
 import os
 import re
 import subprocess
@@ -16,9 +17,9 @@ from birthsim.door import COMMANDS
 from birthsim_env import Parameters
 from studies.comparison import tables as comparison_tables
 from studies.scores import tables as score_tables
+from tests.console import ROOT
 from tests.live import axe, browser
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 TABLES = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.md")}
 
@@ -235,3 +236,18 @@ def test_equations_are_drawn_from_a_file_of_the_site(site, page_of):
             assert written > 0, name
             page.wait_for_function(f"document.querySelectorAll('mjx-container').length == {written}")
             assert page.locator(drawn).count() == written, name
+
+
+TEXTLINT = ROOT / "out" / "npm" / "node_modules" / ".bin" / "textlint"
+UNREAD = "<!-- textlint-disable -->\n\nA title with set points.\n\n<!-- textlint-enable -->\n"
+CONFIGURATION = DOCS / "_prose" / ".textlintrc.js"
+
+
+@pytest.mark.skipif(not TEXTLINT.exists() and os.environ.get("CI") != "true", reason="make prose installs textlint")
+def test_other_names_and_long_sentences_are_found(tmp_path):
+    long = " ".join(["word"] * 45)
+    (tmp_path / "page.md").write_text(f"The `set point` is code.\n\nSet points have one name.\n\nA {long}.\n\n{UNREAD}")
+    command = [str(TEXTLINT), "--config", str(CONFIGURATION), "--format", "json", str(tmp_path / "page.md")]
+    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)[0]["messages"]
+    assert [(message["line"], message["ruleId"]) for message in told] == [(3, "terminology"), (5, "sentence-length")]
+    assert "use “Setpoints” instead" in told[0]["message"]

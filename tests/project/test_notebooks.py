@@ -3,14 +3,14 @@
 import os
 import re
 import subprocess
-from pathlib import Path
 
 import pytest
+
+from tests.console import ROOT
 
 nbformat = pytest.importorskip("nbformat")
 pytest.importorskip("jupytext")
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 BINDER = ROOT / "binder"
 ADDRESSES = (
     "../notebooks/{}.ipynb", "https://colab.research.google.com/github/someone/birthsim/blob/gh-pages/notebooks/{}.ipynb",

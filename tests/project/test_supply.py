@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 import birthsim_env
+from tests.console import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 LOCKS = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "requirements").glob("*.txt")}
 PINS = {name: dict(re.findall(r"^([A-Za-z0-9._-]+)==([^\s;]+)", text, re.MULTILINE)) for name, text in LOCKS.items()}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

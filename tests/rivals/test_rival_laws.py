@@ -170,7 +170,7 @@ def test_the_linear_model_is_the_control_model_about_rest() -> None:
 def test_the_schedule_covers_the_workspace_and_is_fine_enough() -> None:
     rig, tolerances = TILTED, np.array([4e-4, 3e-3, 0.2, 20.0])
     law = LinearQuadratic(rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)))
-    design = law._designs["lab"]
+    design = law._designs[True]
     low, step, table = design["lowest"], design["step"], design["table"]
     high = low + step * (lqr.SCHEDULE - 1)
     strokes = np.array(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 5))).reshape(2, -1)

@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from baselines.admittance.law import beyond
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
-from baselines.rivals.tracking import Integrals, TrackingController, beyond
+from baselines.rivals.tracking import Integrals, TrackingController
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.controllers.test_through_friction import recorded

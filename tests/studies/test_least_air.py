@@ -4,7 +4,6 @@ import math
 import subprocess
 import sys
 from itertools import product
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -13,12 +12,11 @@ from baselines.bench.pneumatic_range import pneumatic_range
 from birthsim_env import Circle, Hold, Parameters, Path, StiffnessSchedule
 from studies.least_air import schedule as module
 from studies.least_air.schedule import GRID, least_air, supplied
-from tests.console import call, strict
+from tests.console import ROOT, call, strict
 
 RIG = Parameters()
 PUSHES = [(20.0, 0.0), (-20.0, 0.0), (0.0, 20.0), (0.0, -20.0)]
 OWN = StiffnessSchedule((0.0, 2.0), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0), (1500.0, 2500.0), (100.0, -100.0))
-EXAMPLES = File(__file__).resolve().parents[2] / "examples"
 
 
 def course(schedule, times):
@@ -106,7 +104,7 @@ def test_what_cannot_be_is_refused(wrong, message):
 
 @pytest.mark.slow
 def test_the_example_of_labour_runs(tmp_path):
-    line = [sys.executable, EXAMPLES / "labour.py", "labour.csv"]
+    line = [sys.executable, ROOT / "examples" / "labour.py", "labour.csv"]
     assert "admittance-backstepping" in subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
 
 

@@ -4,9 +4,8 @@ import pytest
 
 from birthsim_env.physics.compiled.sources import ROOT, hashes
 from studies import shelf
-from studies.door import OWN
 from studies.results import changed, provenance, read_result, written
-from tests.console import assert_says, call
+from tests.console import call
 
 MODULE = "studies.stability.stiffest"
 
@@ -76,9 +75,3 @@ def test_a_table_that_is_typed_is_written_anew(tmp_path, monkeypatch):
 def test_status_lists_every_study(monkeypatch, capsys):
     status, printed, _ = call("study", monkeypatch, capsys, "status")
     assert (status, [line.split()[0] for line in printed.splitlines()]) == (0, shelf.names())
-
-
-def test_what_is_no_study_is_named(monkeypatch, capsys):
-    status, _, complained = call("study", monkeypatch, capsys, "compare")
-    assert status == 2
-    assert_says(("compare", "comparison", *OWN), complained)

@@ -76,7 +76,7 @@ def test_pieces_of_other_settings_or_other_code_are_computed_anew(log, tmp_path,
     results, _ = run_tasks([*made(log, numbers=[0, 1]), *moved], tmp_path / "out", 1, "work")
     assert ran(log)[5:] == [7]
     assert results["deep/2"]["square"] == 49
-    assert "work: 1 are there with other settings, rig or code, and are computed anew" in capsys.readouterr().out
+    assert "work: 2 of 3 are there with these settings, rig and code, and are kept" in capsys.readouterr().out
     monkeypatch.setattr(tasks, "code_stamp", lambda module: {"version": "other"})
     run_tasks(made(log, numbers=[0, 1]), tmp_path / "out", 1, "work")
     assert ran(log)[6:] == [0, 1]

@@ -5,7 +5,7 @@ Figures, their basis and the ranges that are drawn from are fields of ``physics.
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +39,6 @@ class Readings(Rows):
     acceleration = rows("x y", "m/s2", "of the end effector")
 
 
-class Kept(NamedTuple):
-    """What the tracker and the accelerometer of N lanes go by."""
-
-    keys: NDArray[np.uint64]
-    errors: Errors
-    queue: Array
-    """Samples on their way (Q, 3, N)."""
-    arrived: tracker.Arrived
-    accelerometer: acceleration.Accelerometer
-
-
 @helper
 def _converted(value: float, step: float, least: float, most: float) -> float:
     """``value`` as a converter with a ``step`` tells it; a step of 0 is no converter."""
@@ -75,38 +64,41 @@ def _growth(e: Errors, shared: Shared, i: int, x: float, y: float) -> float:
 
 
 @helper
-def _track(world: World, seen: Signals, shared: Shared, kept: Kept, i: int, tick: int) -> None:
-    """Take a sample where it is due, and let arrive what is under way."""
-    e, key, time, latency = kept.errors, kept.keys[i], seen.time[i], kept.errors.figures.position_latency[i]
+def _track(
+    world: World, time: float, shared: Shared, e: Errors, queue: Array, arrived: tracker.Arrived, key: np.uint64, i: int
+) -> None:
+    """Take a sample where it is due, and let arrive what is under way in the ``queue`` (Q, 3, N)."""
+    tick = int(world.tick[i])
     due = tracker.sample_due(tick, time, shared.period, shared.rate)
     if due and (tick == 0 or not happens(key, tick, LOST, e.figures.position_dropout[i])):
         x, y = world.motion.position[0, i], world.motion.position[1, i]
         noise = e.figures.position_noise[i] * _growth(e, shared, i, x, y)
         at_x = _sample(e, shared, i, 0, x, y, noise_of(key, tick, TRACKED, noise))
         at_y = _sample(e, shared, i, 1, x, y, noise_of(key, tick, TRACKED + 1, noise))
-        tracker.take(kept.queue, i, time, shared.rate, at_x, at_y)
+        tracker.take(queue, i, time, shared.rate, at_x, at_y)
         if tick == 0:
             speed = world.motion.velocity
-            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, speed[0, i], speed[1, i])
-    tracker.arrive(kept.queue, kept.arrived, i, time, latency)
+            tracker.start(queue, arrived, i, at_x, at_y, speed[0, i], speed[1, i])
+    tracker.arrive(queue, arrived, i, time, e.figures.position_latency[i])
 
 
 @kernel
 def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, lane: int, n: int) -> int:
     """One control instant."""
     mine = slice(lane, lane + n)
-    kept = Kept(
-        table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine],
-        tracker.Arrived(table2(tables, 3)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine]),
-    )  # fmt: skip
+    keys, e, queue = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine]
+    arrived, own = tracker.Arrived(table2(tables, 3)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine])
     passed, late, readings = table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine], Readings(table2(tables, 6)[:, mine])
-    e, slots = kept.errors, late.shape[0]
+    slots = late.shape[0]
     for i in range(n):
-        tick, key = int(world.tick[i]), kept.keys[i]
-        _track(world, seen, shared, kept, i, tick)
+        tick, key = int(world.tick[i]), keys[i]
+        _track(world, seen.time[i], shared, e, queue, arrived, key, i)
         whole = math.floor(e.delay[i] + 1e-9)
         rest = max(0.0, e.delay[i] - whole)
-        again = acceleration.looked(kept.accelerometer, i, tick)
+        newest, earlier = tick - int(whole), tick - int(whole) - 1
+        # Where other lanes begin anew, all are looked at once more in the same period.
+        again = tick > 0 and own.tick[i] == tick
+        own.tick[i] = tick
         read = tick == 0 or not happens(key, tick, MISSED, e.figures.missed_periods[i])
         for axis in range(2):
             force = world.force[axis, i]
@@ -119,17 +111,20 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
             for k in range(slots if tick == 0 else 1):
                 late[(tick + k) % slots, axis, i] = value
             if read:
-                newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
-                readings.force[axis, i] = newer + rest * (older - newer)
+                newer = late[newest % slots, axis, i]
+                readings.force[axis, i] = newer + rest * (late[earlier % slots, axis, i] - newer)
             if shared.share > 0.0:
-                gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
-                velocity, own = world.motion.velocity[axis, i], kept.accelerometer
-                value = acceleration.feel(own, i, axis, tick, velocity, gain, bias, shared.period, shared.share, again)
+                velocity, last = world.motion.velocity[axis, i], own.low_passed[axis, i]
+                if not again:
+                    # Where an episode begins nothing is known of the motion before it: the acceleration is taken for zero.
+                    change = velocity - (velocity if tick == 0 else own.velocity[axis, i])
+                    felt = (1.0 + e.acceleration_gain[axis, i]) * (change / shared.period) + e.acceleration_bias[axis, i]
+                    own.velocity[axis, i] = velocity
+                    own.low_passed[axis, i] = felt if tick == 0 else last + shared.share * (felt - last)
                 if read:
                     noise = noise_of(key, tick, acceleration.NOISE + axis, shared.acceleration_noise)
-                    readings.acceleration[axis, i] = value + noise
+                    readings.acceleration[axis, i] = own.low_passed[axis, i] + noise
         if read:
-            arrived = kept.arrived
             stamp = arrived.time[i] + (e.figures.position_latency[i] - shared.stamped)
             readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
             for axis in range(2):

@@ -87,12 +87,6 @@ class SensorModel(Protocol):
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement: ...
 
 
-def put_out(sensors: SensorModel, ticks: NDArray[np.int64], openings: Array) -> Array:
-    """What reaches the valves of ``openings`` (4, N) behind the sensors' control board, where they have one."""
-    board = getattr(sensors, "put_out", None)
-    return openings if board is None else np.asarray(board(ticks, openings))
-
-
 SENSORS: dict[str, type[SensorModel]] = {"ideal": IdealSensors, "lab": LabSensors, "honest": HonestSensors}
 """A model that has ``drawn``, names of parameters, and ``vary(ranges)`` draws these for every episode where rigs are drawn;
 one that has ``put_out(ticks, openings)`` and ``board_stage()`` stands between a controller's openings and the valves too."""

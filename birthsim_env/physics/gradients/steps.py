@@ -135,7 +135,7 @@ def backward(
             if k % steps == 0:
                 store(total[INPUTS - 2 : INPUTS], first, n, by_force[k // steps])
                 total[INPUTS - 2 : INPUTS] = 0.0
-        dynamics.copy(lam, total, n)
+        dynamics.copy(lam, total[: at.STATES], n)
         store(total, first, n, result)
 
 
@@ -179,7 +179,7 @@ def advance_tangent(
                 tangent_rig(x, u, f, p, s, out, n)
                 move(x, s, out, x0, s0, total, late, weight_of(stage, step), ahead_of(stage, step), n)
             dynamics.copy(total, x, n)
-            dynamics.copy(late, s, n)
+            dynamics.copy(late, s[: at.STATES], n)
         dynamics.settle(x, n)
         store(x, first, n, state)
         store(s, first, n, along)

@@ -109,14 +109,11 @@ class Parameters:
         follow(parts, self, changes)
         return dataclasses.replace(self, **parts)
 
-    def to_dict(self) -> dict[str, dict[str, Any]]:
+    def to_dict(self, options: bool = False) -> dict[str, dict[str, Any]]:
         """All values as ``{section: {field: value}}``, and ``{"randomize": {name: [low, high]}}`` where there are ranges.
 
-        Options (``quantities.quantity``) are named where they differ from their defaults.
+        Without ``options`` these (``quantities.quantity``) are named only where they differ from their defaults.
         """
-        return self._sections(options=False)
-
-    def _sections(self, options: bool) -> dict[str, dict[str, Any]]:
         sections = {field.name: getattr(self, field.name).to_dict(options) for field in _parts(type(self))}
         return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
@@ -137,7 +134,7 @@ class Parameters:
 
     def to_toml(self, path: str | Path) -> None:
         """Write every value to a TOML file, one table per part."""
-        Path(path).write_text(tomli_w.dumps(self._sections(options=True)), encoding="utf-8")
+        Path(path).write_text(tomli_w.dumps(self.to_dict(options=True)), encoding="utf-8")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:

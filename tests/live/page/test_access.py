@@ -1,10 +1,10 @@
-"""The live page for everybody: keys, screen readers, high contrast, night, small windows; and frames without numbers."""
+"""The live page for everybody: keys, screen readers, high contrast, night, phones, slow motion; and frames without numbers."""
 
 import numpy as np
 import pytest
 
 from birthsim_live.logs.recording import SLICES
-from tests.live.browser import Window
+from tests.live.browser import NARROW, Window
 from tests.live.recordings.made import example, write_recording
 
 DRAWN = """[...document.querySelectorAll('.plot canvas')].some((canvas) =>
@@ -65,25 +65,22 @@ def test_a_screen_reader_is_told_what_matters_and_no_digits(window):
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_rig_is_painted_in_the_colours_of_the_theme(chromium, server, pictures, theme):
+def test_the_rig_is_painted_in_the_colours_of_the_theme(chromium, server, theme):
     with Window(chromium, server.url) as window:
         window.page.emulate_media(color_scheme=theme)
         corner = "document.querySelector('#rig').getContext('2d').getImageData(2, 2, 1, 1).data[0]"
         window.wait(f"{corner} {'>' if theme == 'light' else '<'} 128")
-        window.page.screenshot(path=pictures / f"theme_{theme}.png")
 
 
 @pytest.mark.slow
-def test_high_contrast_keeps_the_pictures_readable_and_the_sliders_visible(chromium, server, pictures):
+def test_high_contrast_keeps_the_pictures_readable_and_the_sliders_visible(chromium, server):
     with Window(chromium, server.url) as window:
         window.page.emulate_media(forced_colors="active", color_scheme="dark")
         window.live(0.3)
-        colours = window.value(
-            "['.plot', '#gauges'].map((place) => getComputedStyle(document.querySelector(place)).backgroundColor)"
-        )
-        assert colours == [window.value("getComputedStyle(document.documentElement).getPropertyValue('--paper').trim()")] * 2
+        paper = window.value("getComputedStyle(document.documentElement).getPropertyValue('--paper').trim()")
+        painted = "['.plot', '#gauges'].map((place) => getComputedStyle(document.querySelector(place)).backgroundColor)"
+        assert window.value(painted) == [paper, paper]
         assert window.value("getComputedStyle(document.querySelector('#set-mass')).forcedColorAdjust") == "none"
-        window.page.screenshot(path=pictures / "forced.png")
 
 
 SIZES = [
@@ -94,7 +91,7 @@ SIZES = [
 
 
 @pytest.mark.parametrize(("compare", "width", "height"), SIZES)
-def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, server, pictures, compare, width, height):
+def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, server, compare, width, height):
     with Window(chromium, f"{server.url}?compare={compare}", {"width": width, "height": height}) as window:
         window.wait(f"document.body.dataset.rigs === '{1 + (compare == 'pid')}'")
         assert window.value("document.documentElement.scrollWidth") <= width
@@ -107,7 +104,6 @@ def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, se
         window.page.locator("#record").click()
         window.wait("birthsim.state.recording !== null && document.querySelector('#record').textContent.includes('Stop')")
         assert window.value(CUT) == []
-        window.page.screenshot(path=pictures / f"{compare}_{width}.png", full_page=True)
         rigs = "[...document.querySelectorAll('.rigs canvas')].map((one) => one.getBoundingClientRect().toJSON())"
         boxes = [box for box in window.value(rigs) if box["width"]]
         # On a phone the second head is an outline in the first's picture.
@@ -117,12 +113,15 @@ def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, se
 
 
 @pytest.mark.slow
-def test_a_pointer_that_rests_keeps_its_hold(chromium, server):
-    with Window(chromium, server.url) as window:
-        window.hold(across=30)
-        window.live(4.0)  # longer than the rig waits for a word
-        window.wait("birthsim.frame.pointer !== null")
-        window.page.mouse.up()
+def test_a_pointer_that_rests_keeps_its_hold_and_one_that_falls_silent_lets_go(window):
+    window.hold(across=30)
+    window.live(4.0)  # longer than the rig waits for a word
+    window.wait("birthsim.frame.pointer !== null")
+    window.page.mouse.up()
+    window.wait("birthsim.frame.pointer === null")
+    window.page.evaluate("birthsim.send({ type: 'drag', position: [0.53, 0], id: 1 })")
+    window.wait("birthsim.frame.pointer !== null")
+    window.wait("birthsim.frame.pointer === null")
 
 
 @pytest.mark.slow
@@ -136,3 +135,56 @@ def test_frames_without_numbers_are_shown_as_such(window, tmp_path):
     for time, shown in ((0.5, "–"), (0.1, "+0.0")):
         window.page.locator("#scrub").fill(str(time))
         window.wait(f"document.querySelector('[data-figure=displacement] dd').textContent.startsWith('{shown}')")
+
+
+def test_every_choice_is_offered(window):
+    for name in ("scenario", "controller", "valves", "sensors"):
+        offered = window.value(f"document.querySelector('select[name={name}]').options.length")
+        assert offered == window.value(f"birthsim.hello.choices.{name}.length")
+
+
+def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, server):
+    with Window(chromium, server.url, NARROW, touch=True) as window:
+        session = window.context.new_cdp_session(window.page)
+
+        def touch(kind, *points):
+            places = [{"x": x, "y": y} for x, y in points]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+        x, y = window.end_effector()
+        touch("touchStart", (x, y))
+        for k in range(1, 6):
+            touch("touchMove", (x - 4 * k, y + 8 * k))
+        window.wait("birthsim.frame.force[1] < -10")
+        assert window.value("scrollY") == 0
+        touch("touchEnd")
+        window.wait("birthsim.frame.pointer === null")
+        sheet = "document.querySelector('#fold')"
+        place = window.value("document.querySelector('#rig').getBoundingClientRect().top")
+        touch("touchStart", (x, 760))
+        for k in range(1, 9):
+            touch("touchMove", (x, 760 - 15 * k))
+        window.wait(f"{sheet}.scrollTop > 20")
+        touch("touchEnd")
+        assert window.value("document.querySelector('#rig').getBoundingClientRect().top") == place, "the rig stays"
+        # The handle makes the sheet higher, by finger and by keys; a tap folds it away.
+        handle = window.page.locator("#handle")
+        box = handle.bounding_box()
+        middle, top = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        touch("touchStart", (middle, top))
+        for k in range(1, 6):
+            touch("touchMove", (middle, top - 20 * k))
+        touch("touchEnd")
+        window.wait(f"Math.abs({sheet}.clientHeight - {0.42 * NARROW['height'] + 100}) < 3")
+        handle.press("ArrowDown")
+        window.wait(f"Math.abs({sheet}.clientHeight - {0.42 * NARROW['height'] + 40}) < 3")
+        assert window.value("birthsim.frame.pointer") is None, "no key pushes the head"
+        handle.tap()
+        window.wait(f"{sheet}.clientHeight === 40")
+        assert window.value("document.documentElement.scrollHeight") == NARROW["height"]
+
+
+def test_slow_motion(window):
+    for speed in ("0.1", "1"):
+        window.page.locator("#speed").select_option(speed)
+        window.wait(f"birthsim.state.speed === {speed}")

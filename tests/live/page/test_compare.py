@@ -10,9 +10,6 @@ BESIDE = "birthsim.frame !== null && birthsim.frame.second !== null && document.
 ALONE = "birthsim.frame.second === null && document.body.dataset.rigs === '1'"
 SHOWN = "[...document.querySelectorAll('.rigs figure')].map((one) => one.offsetParent !== null)"
 NAMES = "[...document.querySelectorAll('.rigs b')].map((one) => one.textContent)"
-CAPTION = (
-    "[...document.querySelectorAll('.rigs figure')].map((one) => [...one.querySelectorAll('i')].map((i) => i.textContent))"
-)
 
 BLUE = """(() => {
     const canvas = document.querySelector('#magnifier');
@@ -60,26 +57,20 @@ def test_a_choice_brings_a_second_rig_and_takes_it_away(window):
 
 
 @pytest.mark.parametrize("k", [1, pytest.param(0, marks=pytest.mark.slow)])
-def test_whichever_head_is_dragged_one_place_of_the_hand_pulls_both(pair, pictures, k):
-    spring = pair.page.locator("#set-drag_stiffness")
-    spring.press("Home")
+def test_whichever_head_is_dragged_one_place_of_the_hand_pulls_both(pair, k):
+    pair.page.locator("#set-drag_stiffness").press("Home")
     pair.wait("birthsim.settings.drag_stiffness === birthsim.hello.ranges.drag_stiffness.min")
-    head = "birthsim.frame.position" if k == 0 else "birthsim.frame.second.position"
-    x, y = pair.value(f"birthsim.pixel({head}, {k})")
-    mouse = pair.page.mouse
-    mouse.move(x, y)
-    mouse.down()
-    mouse.move(x + 60, y, steps=6)
-    pair.wait("birthsim.frame.pointer !== null && birthsim.frame.second.pointer !== null")
+    pair.hold(across=60, rig=k)
     # The admittance law comes to rest at force over stiffness; the paper's law, under the same hand, does not get there.
     frame = pair.settle(least=10)
     assert frame["pointer"] == frame["second"]["pointer"]
     assert displacement(frame)[0] == pytest.approx(rendered(frame)[0], rel=0.1)
     pair.wait("birthsim.frame.second.error_mm > 5 * birthsim.frame.error_mm")
-    pair.wait(f"({CAPTION}).every(([error, rms, felt]) => error > 0 || rms > 0) && ({CAPTION})[1][1] > 0.2")
-    assert pair.value(f"({CAPTION})[0][2]") == "2,000"
-    pair.page.screenshot(path=pictures / f"compare_{k}.png")
-    mouse.up()
+    figures = "[...document.querySelectorAll('.rigs figure')]"
+    captions = f"{figures}.map((one) => [...one.querySelectorAll('i')].map((i) => i.textContent))"
+    pair.wait(f"{captions}.every(([error, rms, felt]) => error > 0 || rms > 0) && {captions}[1][1] > 0.2")
+    assert pair.value(f"{captions}[0][2]") == "2,000"
+    pair.page.mouse.up()
     pair.wait("birthsim.frame.second.pointer === null && Math.hypot(...birthsim.frame.second.force) === 0")
 
 
@@ -141,7 +132,7 @@ def test_keys_push_both_with_one_force_pause_and_reset_both(pair):
 
 
 @pytest.mark.slow
-def test_both_are_replayed_by_a_server_and_on_the_page(chromium, pair, tmp_path, pictures):
+def test_both_are_replayed_by_a_server_and_on_the_page(chromium, pair, tmp_path):
     file = write_recording(tmp_path / "two.rec", example(500, second=True))
     seconds = []
     with Server("live", "--replay", file) as server, Window(chromium, server.url) as viewer:
@@ -153,7 +144,6 @@ def test_both_are_replayed_by_a_server_and_on_the_page(chromium, pair, tmp_path,
             one.wait(f"{BESIDE} && Math.abs(birthsim.frame.time - 1.5) < 1e-4")
             assert one.value(NAMES) == ["backstepping", "lqr"]
             seconds.append(one.frame()["second"])
-        viewer.page.screenshot(path=pictures / "compare_replay.png")
     assert seconds[0] == seconds[1]
     assert seconds[0]["force"] == pytest.approx([20.0, 5.0])
     pair.back()

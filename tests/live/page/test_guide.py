@@ -11,18 +11,16 @@ MARKED = "document.querySelectorAll('.look').length"
 LESSON = "document.querySelector('#guide').value"
 
 
-def test_the_page_opens_with_a_problem_a_cue_and_its_headline(chromium, server, pictures):
+def test_the_page_opens_with_a_problem_a_cue_and_its_headline(chromium, server):
     with Window(chromium, server.url) as window:
         assert window.value(LESSON) == "Feel the friction"
         assert window.value("birthsim.settings.controller") == "backstepping"
         assert window.value("location.search") == ""
         assert window.value("birthsim.scenes[0].cue")
         assert window.value(FELT).startswith("–")
-        window.page.screenshot(path=pictures / "opens.png")
         window.hold(across=50)
         assert not window.value("birthsim.scenes[0].cue")
         window.wait(f"/^2,[1-9]\\d0 N.m, asked for 2,000$/.test({FELT})")
-        window.page.screenshot(path=pictures / "pulled.png")
 
 
 def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window):

@@ -17,14 +17,9 @@ def mine(tmp_path_factory) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def served(mine):
-    with Server("live", "--controller", f"{mine}:Law", "--compare", "shut-valves") as running:
-        yield running
-
-
-def test_two_run_in_python_side_by_side_until_others_are_chosen(chromium, served):
-    with Window(chromium, served.url) as window:
+def test_two_run_in_python_side_by_side_until_others_are_chosen(chromium, mine):
+    options = ("--controller", f"{mine}:Law", "--compare", "shut-valves")
+    with Server("live", *options) as server, Window(chromium, server.url) as window:
         window.wait("birthsim.settings.controller.endsWith('mine.py:Law') && birthsim.settings.compare === 'shut-valves'")
         window.wait("birthsim.frame.second?.time > 0.2 && birthsim.frame.time === birthsim.frame.second.time")
         assert window.value("document.querySelector('select[name=controller]').selectedOptions[0].text") == "mine.py:Law"
@@ -40,7 +35,7 @@ def test_two_run_in_python_side_by_side_until_others_are_chosen(chromium, served
 def test_what_goes_wrong_is_shown_and_a_reset_makes_it_anew(chromium, mine):
     with Server("live", "--controller", f"{mine}:Fails") as server, Window(chromium, server.url) as window:
         window.wait(f"{LOST}.includes('mine.py:Fails gives up: ZeroDivisionError: division by zero')")
-        mine.write_text(OWN.replace("return 1 / 0", "return self.own.command(measurement, reference)"))
+        mine.write_text(OWN.replace("self.calls / 0", "None"))
         window.page.keyboard.press("r")
         window.wait("birthsim.frame.lost === null && birthsim.frame.time > 0.1")
         mine.write_text(OWN)

@@ -15,27 +15,6 @@ from tests.live.rig.worker import run
 
 pytestmark = pytest.mark.slow
 
-SILENT = """async () => {
-  const { load } = await import(new URL("rig/birthsim.js", location));
-  const { Hub } = await import(new URL("worker/hub.js", location));
-  const pack = await (await fetch(new URL("rig/pack.json", location))).json();
-  const read = async (name) => (await fetch(new URL(`rig/${name}`, location))).arrayBuffer();
-  const [code, data] = [await read("loop.wasm"), await read("loop.bin")];
-  const bundle = await load({ code, data });
-  pack.numbers.patience = 0.2;
-  const held = [];
-  return new Promise((resolve) => {
-    const hub = new Hub(pack, bundle, ({ type, pointer }) => {
-      if (type === "frame") held.push(pointer !== null);
-      if (held.includes(true) && held.at(-1) === false) resolve(true);
-    });
-    setTimeout(() => resolve(false), 60e3);
-    hub.start();
-    hub.receive({ type: "drag", position: [0.53, 0], id: 1 });
-  });
-}"""
-"""True once a rig has let go of a hand that said a single word."""
-
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
@@ -98,10 +77,6 @@ def test_a_policy_of_ones_own_opens_the_page(chromium, server):
         window.wait("birthsim.settings.controller.endsWith('own') && birthsim.frame.lost === null")
         window.wait("document.querySelector('select[name=controller]').selectedOptions[0].text.includes('own')")
         window.live(0.2)
-
-
-def test_a_hand_that_falls_silent_lets_go(window):
-    assert window.page.evaluate(SILENT)
 
 
 def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):

@@ -45,7 +45,6 @@ def test_a_switch_calms_the_head_under_the_same_pull(story):
     story.wait("birthsim.plots.shown.history.view('error').at(0) < 10 && birthsim.plots.shown.history.view('time')[0] > 1")
     # With 20 N the challenge counts, and after five seconds it is met.
     story.wait("document.querySelector('#challenge').textContent === 'done'")
-    story.page.mouse.up()
 
 
 def test_a_press_beside_the_head_shows_where_it_is(story):

@@ -1,12 +1,13 @@
-"""``birthsim study beside-law``: several seeds of a policy beside their controller, in the same worlds."""
+"""``birthsim study beside-law`` and ``own-motion``: policies beside their controllers, in the same worlds."""
 
 import json
 import shutil
 
+import numpy as np
 import pytest
 
 from agents.policy.seeds import SHIPPED
-from studies.residual import beside_law
+from studies.residual import beside_law, own_motion
 from tests.console import call
 
 LAW = "backstepping-force-first"
@@ -70,7 +71,18 @@ def test_without_a_force_sensor_no_law_that_reads_one_runs_beside(monkeypatch, c
     assert "force_sensor = False with law = 'admittance-adaptive'" in complained
 
 
-def test_no_policy_is_one_line(monkeypatch, capsys, tmp_path):
-    status, _, complained = call("beside-law", monkeypatch, capsys, "--policy", tmp_path, "--out", tmp_path / "out")
-    assert status == 2
-    assert len(complained.strip().splitlines()) == 1
+@pytest.mark.slow
+def test_a_policy_stands_beside_its_controller_under_a_moving_hand(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(own_motion, "HANDS", ("guided",))
+    shutil.copytree(SHIPPED / "circle_honest_apg" / "seed_0", tmp_path / "own" / "seed_0")
+    common = ("--policy", tmp_path / "own", "--episodes", 32, "--seed", 86000, "--jobs", 1, "--out", tmp_path / "out")
+    status, _, complained = call("own-motion", monkeypatch, capsys, *common)
+    assert status == 0, complained
+    figures = json.loads((tmp_path / "out" / "own-motion.json").read_text())["figures"]
+    law, policy = figures["moving"]
+    assert law["less"] is None
+    less, low, high = policy["less"]
+    assert 0.0 < low < less < high < law["error"][0]
+    (_, stiffness), (_, other) = figures["static"].items()
+    assert np.all(np.diff(stiffness) >= 0)
+    assert other[0] < 3.0, "the median"
