@@ -83,10 +83,20 @@ def test_rows_by_number_are_found():
     assert not list(rows_by_number(f"def k(x):\n  {body}"))
 
 
+GIVEN = {
+    "birthsim_env/loop/world.py": {"motion[2 + axis, i]", *(f"joints[{k}, i]" for k in range(4))},
+    "birthsim_env/parts/hands/contractions.py": {"waves[0, place]", "force[0, i]", "force[1, i]", "times[low + 1]"},
+    "birthsim_env/parts/hands/user_forces.py": {"knots[min(low + 1, count - 1)]"},
+    "baselines/estimation/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)},
+}
+"""Arguments that are one named group of whoever calls, and tables whose first index is a place in time."""
+
+
 def test_kernels_name_their_rows():
     found = []
     for path in (one for name in ("birthsim_env", "baselines", "agents", "studies") for one in (ROOT / name).rglob("*.py")):
         place = path.relative_to(ROOT).as_posix()
         if place != HASH and "/physics/" not in place:
-            found += [f"{place}: {row}" for row in rows_by_number(path.read_text(encoding="utf-8"))]
+            by_number = set(rows_by_number(path.read_text(encoding="utf-8")))
+            found += [f"{place}: {row}" for row in by_number - GIVEN.get(place, set())]
     assert found == []
