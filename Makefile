@@ -197,7 +197,12 @@ bench: $(READY)
 
 pictures: $(READY)
 	$(BIN)/birthsim figure4 --out $(OUT)/figure4
-	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
+	cp $(OUT)/figure4/figure4.svg $(OUT)/figure4/rig.png docs/
+	printf '[mechanics]\nmass = 3.6\n[cylinder1]\ncoulomb_friction = 16.0\n[valves]\nsonic_conductance = 4.4e-9\ntime_constant = 0.0055\n[chambers]\ndead_volume = 16e-6\n[electronics]\nposition_latency = 0.008\n' > $(OUT)/lab.toml
+	$(BIN)/birthsim identify --propose $(OUT)/plan.csv
+	$(BIN)/birthsim identify --simulate $(OUT)/plan.csv --parameters $(OUT)/lab.toml --out $(OUT)/log.parquet
+	$(BIN)/birthsim identify $(OUT)/log.parquet --out $(OUT)/rig.toml --report $(OUT)/identify
+	cp $(OUT)/identify/residuals.svg docs/identify_residuals.svg
 	$(BIN)/birthsim animate --seed 1 --out docs/forceps.webp
 	$(BIN)/birthsim animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
 	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
@@ -228,8 +233,8 @@ learned: $(READY)
 	$(BIN)/birthsim study render
 	$(BIN)/birthsim explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim explain --policy circle --no-pushes --out $(OUT)/learned/explain
-	cp $(OUT)/learned/explain/correction.png docs/
-	cp $(OUT)/studies/learned/learning_curves.png $(OUT)/studies/by-gradients/from_scratch.png docs/
+	cp $(OUT)/learned/explain/correction.svg docs/
+	cp $(OUT)/studies/learned/learning_curves.svg $(OUT)/studies/by-gradients/from_scratch.svg docs/
 
 scratch: $(READY)
 	$(BIN)/python examples/from_scratch.py --out $(OUT)/scratch
@@ -259,7 +264,6 @@ soak: $(READY)
 	$(BIN)/birthsim study soak --out $(OUT)/soak
 
 golden: $(READY)
-	$(BIN)/python -m tests.oracles.golden.make
 	$(BIN)/python -m tests.oracles.golden.fingerprints
 
 clean:

@@ -7,7 +7,6 @@ if TYPE_CHECKING:
     from baselines.admittance.controller import AdmittanceController
     from baselines.backstepping.cartesian_controller import CartesianBackstepping
     from baselines.backstepping.controller import BacksteppingController
-    from baselines.backstepping.lyapunov import LyapunovFunction
     from baselines.bench.evaluation import Evaluation, evaluate
     from baselines.controller import Controller
     from baselines.registry import controller_names, make_controller
@@ -18,7 +17,6 @@ _PLACES = {
     "CartesianBackstepping": "backstepping.cartesian_controller",
     "Controller": "controller",
     "Evaluation": "bench.evaluation",
-    "LyapunovFunction": "backstepping.lyapunov",
     "controller_names": "registry",
     "evaluate": "bench.evaluation",
     "make_controller": "registry",
@@ -27,7 +25,7 @@ _PLACES = {
 
 __all__ = [
     "AdmittanceController", "BacksteppingController", "CartesianBackstepping", "Controller", "Evaluation",
-    "LyapunovFunction", "controller_names", "evaluate", "make_controller",
+    "controller_names", "evaluate", "make_controller",
 ]  # fmt: skip
 
 

@@ -51,8 +51,8 @@ def controller_of(part: Any) -> Controller:
     if callable(part):
         return PlainLaw(part)
     raise ValueError(
-        f"controller = {shown(part)}; allowed: an object with command(measurement, reference) and reset(), or a function of "
-        "measurement and reference"
+        f"controller = {shown(part)}; allowed: an object with command(measurement, reference) and reset(), such as "
+        "make_controller(name, parameters) returns, or a function of measurement and reference"
     )
 
 

@@ -1,15 +1,12 @@
 """What ``birthsim run`` does: one episode, its error over time printed, its motion drawn."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import gymnasium
 import numpy as np
-from tqdm import tqdm
 
+from baselines.commands.episodes import driven, record
 from baselines.commands.settings import RANDOMIZE
-from baselines.commands.worlds import check_environment, policy_of, with_options
-from baselines.registry import make_controller
-from baselines.staged import NO_ACTION, driving
+from baselines.commands.worlds import check_environment, with_options
 from birthsim_env.files import make_folder, whole_results
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
@@ -27,14 +24,11 @@ def run(settings: "Settings") -> None:
     rig = load_parameters(settings.parameters)
     check_environment(settings.env)
     name = with_options([settings.controller], settings.set)[0]
-    law = driving(make_controller(name, rig, **({"policy": policy_of(settings.env)} if name == "residual" else {})), name)
-    env = gymnasium.make(
-        settings.env, parameters=rig, sensors=settings.sensors, randomize=RANDOMIZE[settings.randomize],
-        policy_period=rig.electronics.control_period, actuation=law, **settings.parts(),
-    )  # fmt: skip
+    randomize = RANDOMIZE[settings.randomize]
+    env = driven(settings.env, name, rig, sensors=settings.sensors, randomize=randomize, **settings.parts())
     folder = make_folder(settings.out)
-    print(described(rig, RANDOMIZE[settings.randomize], settings.sensors))
-    episode, lost = record(env, settings.seed)
+    print(described(rig, randomize, settings.sensors))
+    episode = record(env, settings.seed, FIELDS, "episode")
     # pyplot takes half a second to load.
     from baselines.figures.runs import episode_figure
 
@@ -42,25 +36,9 @@ def run(settings: "Settings") -> None:
     with whole_results(folder) as place:
         episode_figure(episode, title, place)
     print("\n".join([title, "", *table(episode)]))
-    if lost:
+    if episode["lost"][-1]:
         print(f"\nlost after {episode['time'][-1]:.2f} s: a piston ran into its stop, or a chamber left its range")
     print(f"\nwritten to {folder}/: episode.png, episode.svg")
-
-
-def record(env: Any, seed: int) -> tuple[dict[str, Array], bool]:
-    """``FIELDS`` of every control period of an episode, a row each, and whether it ended before its time."""
-    _, info = env.reset(seed=seed)
-    rows: dict[str, list[Any]] = {name: [np.copy(info[name])] for name in FIELDS}
-    terminated = truncated = False
-    with tqdm(total=env.get_wrapper_attr("duration"), desc="episode", unit=" s", leave=False) as bar:
-        while not (terminated or truncated):
-            _, _, terminated, truncated, info = env.step(NO_ACTION)
-            for name, kept in rows.items():
-                kept.append(np.copy(info[name]))
-            if len(rows["time"]) % 500 == 0:
-                bar.update(float(info["time"]) - bar.n)
-    env.close()
-    return {name: np.array(kept) for name, kept in rows.items()}, bool(terminated)
 
 
 def table(episode: dict[str, Array]) -> list[str]:

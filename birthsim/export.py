@@ -1,6 +1,7 @@
 """``birthsim export --to FORM``: what leaves BirthSIM, each form by the command that writes it."""
 
 import sys
+from argparse import ArgumentParser
 
 from baselines.commands.start import perform
 from birthsim_env.physics.rig.values import near, shown
@@ -25,12 +26,13 @@ FORMS: dict[str, tuple[str, str, str, str]] = {
 
 def main() -> None:
     """Run the command that ``--to`` names, with all arguments."""
-    arguments = sys.argv[1:]
-    form = _form(arguments)
+    options = ArgumentParser(add_help=False, allow_abbrev=False)
+    options.add_argument("--to", nargs="?")
+    form: str | None = options.parse_known_args()[0].to
     if form in FORMS:
         package, module, _, example = FORMS[form]
         perform("birthsim export", package, f"commands.{module}", f"birthsim export --to {form} {example}")
-    elif form is None and {"-h", "--help"} & set(arguments):
+    elif form is None and {"-h", "--help"} & set(sys.argv):
         forms = (f"  {name:10} {what}" for name, (_, _, what, _) in FORMS.items())
         lines = ["usage: birthsim export --to FORM ...", "", "forms:", *forms]
         example = f"example: birthsim export --to wasm {FORMS['wasm'][3]}"
@@ -41,13 +43,3 @@ def main() -> None:
         allowed = "what birthsim export --help lists" if asked else ", ".join(FORMS)
         print(f"birthsim export: error: --to {said}{asked}; allowed: {allowed}", file=sys.stderr)
         raise SystemExit(2)
-
-
-def _form(arguments: list[str]) -> str | None:
-    """What ``--to FORM`` or ``--to=FORM`` says."""
-    for k, argument in enumerate(arguments):
-        if argument.startswith("--to="):
-            return argument.removeprefix("--to=")
-        if argument == "--to" and k + 1 < len(arguments):
-            return arguments[k + 1]
-    return None

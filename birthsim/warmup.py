@@ -2,13 +2,12 @@
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
-import gymnasium
 from tqdm import tqdm
 
-from baselines.registry import LISTED, make_controller
-from baselines.staged import NO_ACTION, driving
+from baselines.commands.episodes import driven
+from baselines.registry import LISTED
+from baselines.staged import NO_ACTION
 from birthsim_env.physics.rig.parameters import Parameters
 
 
@@ -22,10 +21,7 @@ def main(_: Settings) -> None:
     rig, began = Parameters(), time.perf_counter()
     with tqdm(LISTED, desc="compiling", unit=" controllers", leave=False) as bar:
         for name in bar:
-            env: Any = gymnasium.make(
-                "BirthSIM/Circle-v1", sensors="lab", policy_period=rig.electronics.control_period,
-                actuation=driving(make_controller(name, rig), name),
-            )  # fmt: skip
+            env = driven("BirthSIM/Circle-v1", name, rig, sensors="lab")
             env.reset(seed=0)
             env.step(NO_ACTION)
             env.close()

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from birthsim_env import observation
-from birthsim_env.drawing.rendering import checked_size
+from birthsim_env.drawing.scene import checked_size
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
@@ -137,17 +137,11 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     ``TypeError`` for arguments that there are not."""
     refuse_unknown(arguments)
     given: Arguments = {**DEFAULTS, **arguments}
-    valves, sensors, randomize, actuation = given["valves"], given["sensors"], given["randomize"], given["actuation"]
-    reference, user_force, stiffness, duration = (
-        given["reference"],
-        given["user_force"],
-        given["stiffness"],
-        given["duration"],
-    )
+    randomize, actuation, duration = given["randomize"], given["actuation"], given["duration"]
     table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
     rig = load_parameters(given["parameters"])
-    one_of("valves", valves, VALVE_LAYOUTS)
-    one_of("sensors", sensors, tuple(SENSORS))
+    valves = one_of("valves", given["valves"], VALVE_LAYOUTS)
+    sensors = one_of("sensors", given["sensors"], tuple(SENSORS))
     one_of("force_sensor", given["force_sensor"], (True, False))
     one_of("clip_actions", given["clip_actions"], (True, False))
     if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
@@ -168,36 +162,20 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not is_within(duration, above=0.0, most=LONGEST):
         raise ValueError(f"duration = {shown(duration)}; allowed: None or a positive number, at most {LONGEST:g} (s)")
-    trajectory = default_reference if reference is None else trajectory_of(reference, duration or table.duration)
-    check_drawn(trajectory, duration or table.duration, rig)
-    simulation = Simulation(
-        num_envs,
-        rig,
-        ranges,
-        trajectory,
-        default_force if user_force is None else hand_of(user_force, varied),
-        default_stiffness if stiffness is None else stiffness_of(stiffness),
-        sensors,
-        chosen,
-        policy_periods(given["policy_period"], rig),
-        threads_for(num_envs, given["num_threads"]),
-        given["force_sensor"],
-    )
+    lasts = float(duration or table.duration)
+    trajectory = default_reference if given["reference"] is None else trajectory_of(given["reference"], lasts)
+    check_drawn(trajectory, lasts, rig)
+    hand = default_force if given["user_force"] is None else hand_of(given["user_force"], varied)
+    stiffness = default_stiffness if given["stiffness"] is None else stiffness_of(given["stiffness"])
+    periods, threads = policy_periods(given["policy_period"], rig), threads_for(num_envs, given["num_threads"])
+    parts = trajectory, hand, stiffness, sensors, chosen
+    simulation = Simulation(num_envs, rig, ranges, *parts, periods, threads, given["force_sensor"])
     limit = observation.LIMIT
-    names = (*(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
-    size = observation.SIZE + len(names)
-    return Setup(
-        simulation,
-        chosen,
-        float(duration or table.duration),
-        float(given["policy_period"]),
-        given["clip_actions"],
-        table.title,
-        checked_size("picture_size", given["picture_size"]),
-        spaces.Box(-limit, limit, (size,), np.float32),
-        spaces.Box(-1.0, 1.0, (chosen.size,), np.float32),
-        (*(str(entry) for entry in observation.ENTRIES), *names),
-    )
+    names = (*map(str, observation.ENTRIES), *(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
+    seen, acted = spaces.Box(-limit, limit, (len(names),), np.float32), spaces.Box(-1.0, 1.0, (chosen.size,), np.float32)
+    size = checked_size("picture_size", given["picture_size"])
+    how = lasts, float(given["policy_period"]), given["clip_actions"], table.title, size
+    return Setup(simulation, chosen, *how, seen, acted, names)
 
 
 def threads_for(num_envs: int, num_threads: int | None) -> int:
@@ -216,7 +194,8 @@ def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Seque
     wrong = [name for name in unknown if name not in known]
     if wrong:
         # In Python's words: TorchRL, for one, looks for them.
-        raise TypeError(f"got an unexpected keyword argument {', '.join(map(repr, wrong))}; allowed: {', '.join(known)}")
+        said = ", ".join(f"{name!r}{near(name, known)}" for name in wrong)
+        raise TypeError(f"got an unexpected keyword argument {said}; allowed: {', '.join(known)}")
 
 
 def checked_actions(actions: Any, num_envs: int, size: int, clip: bool, arrays: Any = np) -> Any:

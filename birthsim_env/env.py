@@ -132,21 +132,13 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - v0: first version.
     """
 
-    # Gymnasium declares it as an instance variable with a default.
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
-
     @spelled_out()
     def __init__(self, scenario: str, render_mode: str | None = None, **arguments: Unpack[Arguments]) -> None:
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         setup = assemble(1, scenario, **arguments)
         self.observation_space: spaces.Space[Any] = setup.single_observation_space
         self.action_space: spaces.Space[Any] = setup.single_action_space
-        self.observation_names = setup.observation_names
-        self.simulation = setup.simulation
-        # A recorder takes a frame per step.
-        self.metadata = {**self.metadata, "render_fps": setup.frames_per_second}
-        self.steps = setup.steps
-        self._episodes = Episodes(setup)
+        self._show(Episodes(setup))
 
     @property
     def measurement(self) -> Measurement:
@@ -166,7 +158,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     @property
     def scene(self) -> Scene:
-        """What a frame shows now, in any render mode; see ``birthsim_env.drawing.rendering.Scene``."""
+        """What a frame shows now, in any render mode; see ``birthsim_env.drawing.scene.Scene``."""
         return self._episodes.scene(0)
 
     def reset(

@@ -97,7 +97,7 @@ class Episodes:
         if not again:
             self._numbers[lanes] += 1
         self.elapsed[lanes] = 0
-        self._outcome.begin(lanes)
+        self.forget(lanes)
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
         self._path = None
 
@@ -105,9 +105,13 @@ class Episodes:
         """Put the episodes of these ``numbers`` of lanes with these ``seeds`` into the first lanes, whatever was there."""
         count, missing = self.simulation.plant.num_envs, self.simulation.plant.num_envs - len(seeds)
         first = np.arange(count) < len(seeds)
-        self._outcome.begin(first)
+        self.forget(first)
         episodes = np.concatenate([numbers, np.zeros(missing, dtype=np.int64)])
         self.simulation.begin(first, seeds + [0] * missing, episodes, self._setup.duration, position)
+
+    def forget(self, lanes: Mask) -> None:
+        """What closes a policy step forgets the past of the lanes of a mask (N,)."""
+        self._outcome.begin(lanes)
 
     def record(self) -> "Recorder":
         """What keeps every policy step from now on, for gradients."""
@@ -149,7 +153,7 @@ class Episodes:
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """Whether the episodes are successful so far, (N,): see ``birthsim_env.success``."""
+        """Whether the episodes are successful so far, (N,): see ``birthsim_env.reward``."""
         return np.asarray(self._outcome.ends[1] > 0.0)
 
     def outcome_rows(self) -> list[tuple[Array, list[str]]]:

@@ -1,10 +1,11 @@
 """What the single and the vector environment say of themselves alike."""
 
 import copy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs.registration import EnvSpec
 
+from birthsim_env.assembly import RENDER_MODES
 from birthsim_env.episodes import Episodes
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -15,11 +16,19 @@ if TYPE_CHECKING:
 class Face:
     """Comes before Gymnasium's class among the bases of an environment."""
 
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012  Gymnasium declares it so
     steps: int
     """Policy steps of an episode that nothing ends early."""
 
     _episodes: Episodes
     _spec: EnvSpec | None = None
+
+    def _show(self, episodes: Episodes, **more: Any) -> None:
+        """Take what the episodes are made of; ``metadata`` has ``more``."""
+        setup, self._episodes = episodes.setup, episodes
+        # A recorder takes a frame per step.
+        self.metadata = {**self.metadata, "render_fps": setup.frames_per_second, **more}
+        self.observation_names, self.simulation, self.steps = setup.observation_names, setup.simulation, setup.steps
 
     @property
     def parameters(self) -> Parameters:

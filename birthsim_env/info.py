@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from birthsim_env.loop.rows import Signals, World
-from birthsim_env.loop.signals import compliance
+from birthsim_env.loop.signals import given_way
 from birthsim_env.physics import control_model, dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -53,8 +53,7 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
     reference, motion = seen.reference, world.motion
     for i in range(n):
         info.time[i], info.since_jump[i] = seen.time[i], world.since_jump[i]
-        kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
-        given = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
+        given = given_way(reference, world.force[0, i], world.force[1, i], i)
         for k in range(2):
             compliant = reference.position[k, i] + given[k]
             info.position[k, i], info.velocity[k, i] = motion.position[k, i], motion.velocity[k, i]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import Signals, fill_measurement
-from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, compliance
+from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, given_way
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
@@ -70,9 +70,8 @@ def look(seen: Signals, action: Array, shown: Array, p: Rig, scales: Array, out:
         pp2, pn2 = seen.pressure[2, i], seen.pressure[3, i]
         half1, half2 = p.half_l1, p.half_l2
         edge1, edge2 = 0.02 * half1, 0.02 * half2
-        kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
         fx, fy = seen.user_force[0, i], seen.user_force[1, i]
-        given = compliance(fx, fy, kx, ky, kxy)
+        given = given_way(reference, fx, fy, i)
         for axis in range(2):
             own.error[axis] = seen.position[axis, i] - reference.position[axis, i] - given[axis]
             own.velocity[axis] = seen.velocity[axis, i]

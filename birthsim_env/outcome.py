@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env import info, observation, reward, success
+from birthsim_env import info, observation, reward
 from birthsim_env.loop.rows import Seen, World
-from birthsim_env.loop.signals import Mask, compliance
+from birthsim_env.loop.signals import Mask, given_way
 from birthsim_env.loop.stage import Stage, block, singles, table2
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
@@ -18,7 +19,7 @@ class Memory(Rows):
     """What is carried from one policy step to the next."""
 
     owed = part(reward.Owed, "for the reward")
-    tally = part(success.Tally, "for success")
+    tally = part(reward.Tally, "for success")
     fresh = row("1", "1 where an episode begins")
     air = row("kg", "drawn from the supply")
     action = rows(0, "1", "the last action")
@@ -51,16 +52,13 @@ def _close(world: World, seen: Seen, memory: int, about: About, tables: int, lan
     if about.stepped > 0.0:
         terms = reward.Terms(table2(tables, 0)[:, mine])
         reward.assess(world, reference, own.owed, action, own.action, about.limits, terms, ends.failed, n)
-        success.add(world, reference, ends.failed, own.tally, ends.success, n)
-        for k in range(size):
-            for i in range(n):
-                own.action[k, i] = action[k, i]
+        reward.add(world, reference, ends.failed, own.tally, ends.success, n)
+        dynamics.copy(action, own.action, n)
     else:
         for i in range(n):
             if own.fresh[i] > 0.0:
                 # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
-                kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
-                given = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
+                given = given_way(reference, world.force[0, i], world.force[1, i], i)
                 for axis in range(2):
                     own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
                 own.fresh[i], ends.failed[i], ends.success[i] = 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What a policy is paid, from the true state: to stay on the compliant target, calmly and with little effort.
+"""What a policy is paid, from the true state: to stay on the compliant target, calmly and with little effort. What is success.
 
 Every 10 ms pay one, less its costs as a fraction of the largest ones. So no step pays less than nothing, and an episode
 that ends early, after which nothing is paid, is never worth more than one that goes on, whatever the discount.
@@ -11,7 +11,7 @@ haste, and rigs near their limit do not return from an overshoot.
 import math
 
 from birthsim_env.loop.rows import World
-from birthsim_env.loop.signals import Reference, compliance
+from birthsim_env.loop.signals import Reference, given_way
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -46,6 +46,12 @@ PRESSURE_RANGE = (0.2e5, 20e5)
 TEMPERATURE_RANGE = (100.0, 1000.0)
 """K, likewise."""
 
+SETTLED = 0.5
+"""s after a jump of force or setpoint (or the start) from which an error counts as settled."""
+
+SUCCESS_ERROR = 1e-3
+"""m, root mean square distance from the compliant target; assumed: a quarter of the paper's law's."""
+
 
 class Terms(Rows):
     """What a policy step pays."""
@@ -76,6 +82,15 @@ class Limits(Numbers):
     impact_speed = number("m/s", "of the fastest collision with an end stop that does not end an episode")
 
 
+class Tally(Rows):
+    """Of an episode so far."""
+
+    squares = row("m2", "sum of the squared distances from the compliant target")
+    steps = row("1", "policy steps")
+    settled_squares = row("m2", "the same, of settled steps")
+    settled_steps = row("1", "settled policy steps")
+
+
 @helper
 def assess(
     world: World, reference: Reference, owed: Owed, action: Array, last_action: Array, limits: Limits, terms: Terms,
@@ -87,10 +102,10 @@ def assess(
     """
     steps, kept = limits.period / 0.01, exact.exp(-limits.period / GIVING_WAY)
     unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
-    state, force = world.state, world.force
+    state = world.state
     for i in range(n):
-        kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
-        given, jumped = compliance(force[0, i], force[1, i], kx, ky, kxy), world.since_jump[i] < limits.jumped_below
+        given = given_way(reference, world.force[0, i], world.force[1, i], i)
+        jumped = world.since_jump[i] < limits.jumped_below
         error, speed = 0.0, 0.0
         for axis in range(2):
             change = given[axis] - owed.given[axis, i]
@@ -120,3 +135,25 @@ def assess(
         terms.effort[i] = -unit * EFFORT_COST * effort / entries
         terms.action_change[i] = -unit * ACTION_CHANGE_COST * turned / entries
         terms.total[i] = terms.survive[i] + terms.tracking[i] + terms.hunting[i] + terms.effort[i] + terms.action_change[i]
+
+
+@helper
+def add(world: World, reference: Reference, failed: Array, tally: Tally, success: Array, n: int) -> None:
+    """Takes one policy step: carries ``tally`` on and writes ``success`` (N,), 1 where an episode is successful so far.
+
+    The error is the root mean square over the policy steps ``SETTLED`` s and more after a jump, or over all of them before
+    there is such a step. An episode that has ``failed`` (N,) is none.
+    """
+    for i in range(n):
+        given_x, given_y = given_way(reference, world.force[0, i], world.force[1, i], i)
+        x = world.motion.position[0, i] - reference.position[0, i] - given_x
+        y = world.motion.position[1, i] - reference.position[1, i] - given_y
+        tally.squares[i] += x * x + y * y
+        tally.steps[i] += 1.0
+        if world.since_jump[i] >= SETTLED:
+            tally.settled_squares[i] += x * x + y * y
+            tally.settled_steps[i] += 1.0
+        any_settled = tally.settled_steps[i] > 0.0
+        squares = tally.settled_squares[i] if any_settled else tally.squares[i]
+        steps = tally.settled_steps[i] if any_settled else tally.steps[i]
+        success[i] = 1.0 if failed[i] == 0.0 and math.sqrt(squares / steps) < SUCCESS_ERROR else 0.0

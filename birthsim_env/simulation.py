@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop import rows as at
+from birthsim_env.loop.instant import Instant
 from birthsim_env.loop.loop import MixedLoop, Place
-from birthsim_env.loop.rows import fill_measurement, measurement_of
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.rows import fill_measurement
+from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
@@ -23,13 +24,12 @@ from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.streams import begin, worlds
 from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by, put_out
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
 
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 Part = Stage | Callable[[int], None]
 
+LOOKS = ("target", "setpoints", "hand", "jumps", "sensors")
+"""Parts that run where an episode begins."""
+
 
 class Runs(Protocol):
     """What runs control periods, on some threads; returns how many lanes and periods a stage could not serve."""
@@ -45,18 +48,8 @@ class Runs(Protocol):
     def run(self, periods: int, threads: int) -> int: ...
 
 
-class Simulation:
-    """``num_envs`` lanes under one actuation, ``periods`` control periods per policy step.
-
-    After ``begin`` and after every ``step`` the attributes describe the present instant:
-
-    - ``time`` (N,), s since each lane's episode began;
-    - ``motion`` (4, N), true x, y, vx, vy of the end effector, m and m/s;
-    - ``force`` (2, N), N, of the hand;
-    - ``reference`` and ``measurement``;
-    - ``since_jump`` (N,), s since the force or a stiffness setpoint jumped;
-    - ``openings`` (4, N) as last commanded;
-    - ``impacts`` (2, N), m/s, the fastest collision of each piston with an end stop during the last step.
+class Simulation(Instant):
+    """``num_envs`` lanes under one actuation, at the ``Instant`` that ``begin`` and every ``step`` lead to.
 
     ``period`` is the control period, s, and ``periods`` of them make a policy step. ``beginning`` stages run where episodes
     begin, ``closing`` stages at the end of a policy step. ``watch`` adds stages that look on in every control period.
@@ -77,8 +70,7 @@ class Simulation:
         threads: int = 1,
         force_sensor: bool = True,
     ) -> None:
-        self.parameters = parameters
-        self.plant = Plant(parameters, num_envs)
+        super().__init__(parameters, num_envs)
         self.nominal = parameter_column(parameters)
         self.trajectory, self.user_force, self.stiffness = trajectory, user_force, stiffness
         self.sensors = SENSORS[sensors](parameters.electronics, num_envs)
@@ -88,27 +80,22 @@ class Simulation:
         self.actuation = actuation
         for part in (trajectory, user_force, stiffness):
             part.prepare(num_envs)
-        self.force_sensor = force_sensor
         self.period = parameters.electronics.control_period
-        self.periods, self.threads = periods, threads
+        self.periods, self.threads, self.force_sensor = periods, threads, force_sensor
         self.beginning: list[Stage] = []
         self.closing: list[Stage] = []
         self._watching: tuple[list[Stage], list[Stage]] = [], []
         self.action: Array = np.zeros((actuation.size, num_envs))
-        self._tick, self._since = np.zeros((1, num_envs)), np.zeros((1, num_envs))
-        self._motion, self._force, self._jumps = np.zeros((4, num_envs)), np.zeros((2, num_envs)), np.zeros((5, num_envs))
-        self.impacts: Array = np.zeros((2, num_envs))
-        self._openings: Array = np.zeros((4, num_envs))
+        self._jumps: Array = np.zeros((5, num_envs))
         self._wanted: Array = np.zeros((4, num_envs))
-        self._seen: Array = np.zeros((at.ASKED, num_envs))
         self._samples: Array = np.zeros((0, 2, num_envs))
         self._sample = 0
-        self._ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        self.ranges: Ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        """What is drawn of the rig."""
         self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
         self.made: tuple[Any, ...] = ()
-        self._loop: MixedLoop | None = None
-        self._look: MixedLoop | None = None
+        self._loop, self._look = None, None  # type: tuple[MixedLoop | None, MixedLoop | None]
         self.recorder: Runs | None = None
         """Runs policy steps in place of the loop, see ``birthsim_env.gradients``."""
 
@@ -120,56 +107,6 @@ class Simulation:
         """Build the loops anew at the next step: arrays may be others."""
         self._loop = None
 
-    @property
-    def time(self) -> Array:
-        """s since each lane's episode began, (N,)."""
-        return np.array(self._seen[at.TIME])
-
-    @property
-    def ticks(self) -> NDArray[np.int64]:
-        """Control periods since each lane's episode began, (N,)."""
-        return np.array(self._tick[0], dtype=np.int64)
-
-    @property
-    def motion(self) -> Array:
-        """True x, y (m), vx, vy (m/s) of the end effector, (4, N)."""
-        return self._motion.copy()
-
-    @property
-    def force(self) -> Array:
-        """User force now, N, (2, N)."""
-        return self._force.copy()
-
-    @property
-    def since_jump(self) -> Array:
-        """s since force or stiffness setpoint jumped, (N,)."""
-        return np.array(self._since[0])
-
-    @property
-    def openings(self) -> Array:
-        """Openings of the valves of chambers P1, N1, P2, N2 as last commanded, (4, N)."""
-        return self._openings.copy()
-
-    @property
-    def seen(self) -> Array:
-        """The first rows of ``Seen``: what the sensors say and what is asked for."""
-        return self._seen
-
-    @property
-    def reference(self) -> Reference:
-        """What is asked for now."""
-        return self.signals_in(self._seen)[1]
-
-    @property
-    def measurement(self) -> Measurement:
-        """What the sensors say now."""
-        return self.signals_in(self._seen)[0]
-
-    def signals_in(self, seen: Array) -> tuple[Measurement, Reference]:
-        """What the sensors say and what is asked for in rows as those of ``seen``."""
-        said = measurement_of(seen, self._sampled, self._sampled and self._has_acceleration)
-        return said, Reference(seen[at.REFERENCE : at.ASKED].copy())
-
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
     ) -> None:
@@ -180,8 +117,8 @@ class Simulation:
         """
         chosen = np.flatnonzero(lanes)
         for block, streams in worlds(chosen, seeds, episodes):
-            if self._ranges:
-                columns = draw_columns(self.parameters, self._ranges, streams["parameters"], len(block))
+            if self.ranges:
+                columns = draw_columns(self.parameters, self.ranges, streams["parameters"], len(block))
                 self.plant.lane_parameters[:, block] = columns
             begin(self.trajectory, block, streams["reference"])
             begin(self.user_force, block, streams["user_force"])
@@ -191,16 +128,15 @@ class Simulation:
         self._tick[:, lanes], self._seen[at.TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
         self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
         rows = checked_start(self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters)
-        start, speed = rows[0:2], rows[2:4]
-        if position is not None:
-            start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
+        motion = rows[:4] if position is None else np.repeat([*position, 0.0, 0.0], len(chosen)).reshape(4, -1)
+        start = motion[:2]
         if not self._begun:
             # The rig as described: that one of those drawn cannot carry its mass is part of the experiment.
             require_carried(start, self.parameters)
             self._begun = True
         inverse_geometry(start, self.parameters)  # refuses what is out of reach
         joints = np.empty((4, len(chosen)))
-        pistons_at(np.concatenate([start, speed]), Rig(self.nominal), joints)
+        pistons_at(motion, Rig(self.nominal), joints)
         own = self.plant.lane_parameters.take(chosen, axis=1)
         self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
         self.plant.begin(chosen)
@@ -273,15 +209,6 @@ class Simulation:
         more = actuation.more_rows(lanes) if hasattr(actuation, "more_rows") else []
         return world, [*seen, *more]
 
-    def _acts(self) -> list[Part]:
-        stages = getattr(self.actuation, "stages", None)
-        return [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
-
-    def _board(self) -> list[Part]:
-        if hasattr(self.sensors, "board_stage"):
-            return [self.sensors.board_stage()]
-        return [self._put_out] if hasattr(self.sensors, "put_out") else []
-
     def rows(self) -> tuple[Array, Array]:
         """Copies of the rows of ``World`` and ``Seen`` now, (WORLD, N) and (SEEN, N)."""
         world, seen = (np.zeros((count, self.plant.num_envs)) for count in (at.WORLD, at.SEEN))
@@ -290,20 +217,22 @@ class Simulation:
                 rows[row : row + len(array)] = array
         return world, seen
 
-    def parts(self) -> dict[str, list[Part]]:
-        """What a control period runs, in this order: stages, and methods that call what a user has written in Python."""
-        senses = [self._compiled(self.sensors, "measure", self._measure)]
-        if not self.force_sensor:
-            senses.append(no_force_stage())
+    def parts(self, begins: bool = False) -> dict[str, list[Part]]:
+        """What a control period runs, in this order: stages, and methods that call what a user has written in Python.
+
+        Those of ``LOOKS`` also run where an episode ``begins``."""
+        stages, put_out = getattr(self.actuation, "stages", None), hasattr(self.sensors, "put_out")
+        board = getattr(self.sensors, "board_stage", lambda: self._put_out)
+        measure = self._compiled(self.sensors, "measure", self._measure)
         return {
-            "actuation": self._acts(),
-            "board": self._board(),
+            "actuation": [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask],
+            "board": [board()] if put_out else [],
             "plant": [plant_stage(self.plant.lane_parameters, self.plant.memory, self.period)],
             "target": [self._compiled(self.trajectory, "sample", self._follow)],
             "setpoints": [self._compiled(self.stiffness, "sample", self._set)],
             "hand": [self._compiled(self.user_force, "force", self._push)],
-            "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, False)],
-            "sensors": senses,
+            "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, begins)],
+            "sensors": [measure] if self.force_sensor else [measure, no_force_stage()],
         }
 
     def _assemble(self) -> None:
@@ -317,10 +246,9 @@ class Simulation:
         made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in every))
         if self._loop is not None and made == self.made:
             return
-        begins = jump_stage(self.period, self.user_force.jump_rate, self._jumps, True)
-        looks = [*parts["target"], *parts["setpoints"], *parts["hand"]]
+        looks = [part for name, group in self.parts(begins=True).items() if name in LOOKS for part in group]
         self._loop = MixedLoop(lanes, *places, every, self.closing)
-        self._look = MixedLoop(lanes, *places, [*looks, begins, *parts["sensors"]], self.beginning)
+        self._look = MixedLoop(lanes, *places, looks, self.beginning)
         self.made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
@@ -348,7 +276,7 @@ class Simulation:
         self._openings[:] = self._wanted
 
     def _put_out(self, _: int) -> None:
-        self._openings[:] = put_out(self.sensors, self.ticks, self._openings)
+        self._openings[:] = self.sensors.put_out(self.ticks, self._openings)  # type: ignore[attr-defined]
 
     def _follow(self, _: int) -> None:
         self._seen[at.REFERENCE : at.REFERENCE + 8] = self.trajectory.sample(self.time)
@@ -371,14 +299,6 @@ class Simulation:
         fill_measurement(self._seen, now)
         self._sampled = now.sampled
 
-    @property
-    def _has_acceleration(self) -> bool:
-        """Whether the head has an acceleration sensor, which exact sensors do without."""
-        return self.parameters.electronics.acceleration_bandwidth > 0.0
-
     def reference_at(self, time: Array) -> Reference:
         """What is asked for at ``time`` (N,) of the present episodes, s."""
-        rows = np.empty((REFERENCES, time.shape[0]))
-        rows[:8] = self.trajectory.sample(time)
-        rows[8:] = self.stiffness.sample(time)
-        return Reference(rows)
+        return Reference(np.concatenate([self.trajectory.sample(time), self.stiffness.sample(time)]))

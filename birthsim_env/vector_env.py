@@ -31,8 +31,8 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
     numbers, to the last bit, as a single environment with its seed. ``max_episode_steps`` shortens episodes.
 
     With ``device="cuda"`` the lanes live on an NVIDIA GPU, with the same bits, and so do all arrays that are returned. They are
-    CuPy's, which PyTorch and JAX take by DLPack without a copy. Actions may be NumPy's, or be there. New episodes are drawn on
-    this processor and copied there. ``device="host"`` runs a GPU's code on this processor.
+    CuPy's, which PyTorch and JAX take by DLPack without a copy. Actions may be NumPy's, or be there. New episodes are drawn
+    there too, so that a part of a user's own may not draw in Python. ``device="host"`` runs a GPU's code on this processor.
 
     ``autoreset_mode`` says what happens to a lane that ends, as in Gymnasium (``AutoresetMode`` or its value):
     - ``NEXT_STEP`` (default): the next step ignores its action and returns the first observation of its new episode, reward 0;
@@ -40,8 +40,6 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
       with;
     - ``DISABLED``: it waits for ``reset(options={"reset_mask": mask})`` with a mask (num_envs,) of bool.
     """
-
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012  Gymnasium declares it so
 
     @spelled_out()
     def __init__(
@@ -67,21 +65,18 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
         if device is None:
-            self._episodes = Episodes(assemble(int(num_envs), scenario, **arguments))
+            episodes = Episodes(assemble(int(num_envs), scenario, **arguments))
         else:
             one_of("render_mode, with a device,", render_mode, (None,))
             on_device = import_module("birthsim_build.device.episodes").DeviceEpisodes
             # Each setup prepares the parts that it is given for its own lanes.
-            self._episodes = on_device(device, int(num_envs), lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
-        setup = self._episodes.setup
-        frames = setup.frames_per_second
-        self.metadata = {**self.metadata, "render_fps": frames, "autoreset_mode": self.autoreset_mode}
+            episodes = on_device(device, int(num_envs), lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
+        setup = episodes.setup
+        self._show(episodes, autoreset_mode=self.autoreset_mode)
         self.num_envs = int(num_envs)
         self.single_observation_space, self.single_action_space = setup.single_observation_space, setup.single_action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.observation_names = setup.observation_names
-        self.simulation = setup.simulation
         self.steps = min(setup.steps, max_episode_steps or setup.steps)
         self._ended: NDArray[np.bool_] = self._episodes.arrays.zeros(self.num_envs, dtype=np.bool_)
 

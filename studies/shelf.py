@@ -26,6 +26,7 @@ ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
 """Texts that do not stand in ``DATA``."""
 
 _QUOTED = re.compile(r"(<!-- figure ([^>]+) -->)(.*?)(<!-- end -->)")
+_PICTURE = re.compile(r"\]\((?:\.\./)*(\w+\.svg)\)")
 _MARKED = re.compile(r"(<!-- results of (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -100,12 +101,13 @@ def render() -> None:
 
 
 def draw() -> None:
-    """Draw the pictures of every result into docs."""
+    """Draw the pictures of every result that a page of docs shows."""
+    shown = {name for page in (ROOT / "docs").rglob("*.md") for name in _PICTURE.findall(page.read_text(encoding="utf-8"))}
     for name in names():
         if (content := read_result(name)) is not None:
             with tempfile.TemporaryDirectory() as folder:
                 for path in declared(name).draw(content, Path(folder)):
-                    if path.suffix == ".png":
+                    if path.name in shown:
                         shutil.copy(path, ROOT / "docs")
 
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from baselines.bench.statistics import number
 from baselines.commands.settings import Configured
-from baselines.commands.tables import aligned, markdown
+from baselines.tables import aligned, markdown
 from birthsim_env.files import make_folder, write_json, write_text
 
 

@@ -35,10 +35,10 @@ def main(settings: Settings) -> None:
 def _write_folder(settings: Settings) -> None:
     from agents.policy.files import WEIGHTS
     from agents.policy.seeds import best_policy
-    from agents.reports.card import TRAINING, model_card
+    from agents.reports.card import TRAINING, compared, model_card
 
     folder = best_policy(settings.policy)
-    card = model_card(folder, f"birthsim-{Path(settings.policy).name}")
+    card = model_card(folder, f"birthsim-{Path(settings.policy).name}", compared(folder))
     out = make_folder(settings.out or folder / "hub")
     with whole_results(out) as place:
         for name in (WEIGHTS, TRAINING):

@@ -1,59 +1,81 @@
 """The card of a trained policy, in the format of the Hugging Face Hub: what it was trained on, where it is better and worse."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from agents.policy.files import load_policy
-from agents.residual.settings import NO_LAW
-from birthsim_env import __version__
+from agents.residual.settings import FORCE_LAWS, NO_LAW, is_one_of
+from baselines.bench.evaluation import Evaluation, evaluate
+from baselines.bench.statistics import penalize_lost, quantile
+from baselines.registry import make_controller
+from birthsim_env import __version__, reference_scores
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
+from birthsim_env.scores import BEST, SENSORS
 
 TRAINING = "training.json"
 """What a training writes beside a policy."""
 
+EPISODES, SEED = 64, 75_900_000
+"""Of the comparison; no training, validation or design had these worlds."""
+
 FIGURES = {
-    "median_mm": ("settled error, median of the episodes", "mm"),
-    "tail_mm": ("settled error, 95th percentile", "mm"),
-    "pooled_mm": ("settled error, over all episodes", "mm"),
-    "stiffness_error_percent": ("stiffness error, median", "%"),
-    "hunting_mm": ("hunting, median", "mm"),
-    "saturation_percent": ("time with a valve at its limit, median", "%"),
-    "lost": ("lost episodes", ""),
+    "settled_rms median": ("settled error, median", "mm"),
+    "settled_rms q95": ("settled error, 95th percentile", "mm"),
+    "stiffness_error median": ("stiffness error, median", "%"),
+    "hunting_x median": ("hunting along x, median", "mm"),
+    "hunting_y median": ("hunting along y, median", "mm"),
+    "saturation median": ("time with a valve at its limit, median", "%"),
+    "air median": ("air, median", "normal l/min"),
+    "lost": ("lost episodes", "%"),
 }
-"""Key in ``TRAINING`` -> name and unit; the smaller, the better."""
+"""Figure, as the hub's metric -> its name and unit; the smaller, the better."""
 
 
-def model_card(folder: Path, name: str) -> str:
-    """The text of ``README.md`` beside a policy; ``ValueError`` where its training left no figures."""
+def compared(folder: Path) -> list[Evaluation]:
+    """A policy, the law that it corrects, the paper's, the one without a force sensor where it has none, and the best one.
+
+    All meet the same worlds, of the kind that its training had."""
     policy = load_policy(folder)
     try:
-        found = json.loads((folder / TRAINING).read_text(encoding="utf-8"))
-        about, whom = found["settings"], [_beside(policy.settings.law), "the paper's controller"]
-        others = {who: found[key] for who, key in zip(whom, ("law", "paper"), strict=True) if found[key]}
-        columns = {"this policy": found["policy"], **others}
-        rows = {
-            key: [figures[key] for figures in columns.values()] for key in FIGURES if columns["this policy"][key] is not None
-        }
-        made = about.get("algorithm") or "imitation of teachers"
-        worlds = f"`sensors={about['sensors']!r}`, `randomize={about['randomize']}`"
-        infeasible = found["law"]["infeasible"]
+        about = json.loads((folder / TRAINING).read_text(encoding="utf-8"))["settings"]
+        sensors, randomize, rig = about["sensors"], about["randomize"], Parameters.from_dict(about["rig"])
     except (OSError, ValueError, KeyError, TypeError) as error:
-        problem = f"policy = {shown(str(folder))} has no figures of its training ({error!r})"
+        problem = f"policy = {shown(str(folder))} says not what it was trained on ({error!r})"
         raise ValueError(f"{problem}; allowed: a folder with {TRAINING}, as birthsim train writes it") from error
+    place = policy.environment.replace("Residual", "")
+    best = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], randomize)[BEST]["controller"]
+    beside = [policy.settings.law, "backstepping", *["admittance-sensorless"] * (not policy.settings.force_sensor), best]
+    controllers = {"this policy": f"residual:{folder}", **{name: name for name in beside if name != NO_LAW}}
+    return [
+        evaluate(place, make_controller(name, rig), who, EPISODES, SEED, sensors=sensors, randomize=randomize, parameters=rig)
+        for who, name in controllers.items()
+    ]
+
+
+def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> str:
+    """The text of ``README.md`` beside a policy, from what ``compared`` found."""
+    policy = load_policy(folder)
+    about = json.loads((folder / TRAINING).read_text(encoding="utf-8"))["settings"]
+    whom, columns = [one.controller for one in evaluations], [figures(one) for one in evaluations]
+    rows = {key: [column[key] for column in columns] for key in FIGURES if np.isfinite(columns[0][key])}
     result = {
         "task": {"type": "reinforcement-learning", "name": "stiffness control"},
         "dataset": {"type": "gymnasium", "name": policy.environment},
         "metrics": [{"type": key, "name": FIGURES[key][0], "value": row[0]} for key, row in rows.items()],
     }
+    force = [policy.settings.force_sensor, *(_reads_force(who) for who in whom[1:])]
     table = [
-        f"| in validation | unit | {' | '.join(columns)} |",
-        "|---|---|" + "---|" * len(columns),
-        *(f"| {FIGURES[key][0]} | {FIGURES[key][1]} | {' | '.join(map(_number, row))} |" for key, row in rows.items()),
+        f"| | {' | '.join(whom)} |",
+        "|---|" + "---|" * len(whom),
+        f"| uses the hand's force | {' | '.join('yes' if one else 'no' for one in force)} |",
+        *(f"| {', '.join(FIGURES[key])} | {' | '.join(map(_number, row))} |" for key, row in rows.items()),
     ]
-    does = (
-        "drives the valves by itself" if policy.settings.law == NO_LAW else f"corrects the controller `{policy.settings.law}`"
-    )
+    law, network = policy.settings.law, policy.network
+    made = about.get("algorithm") or "imitation of teachers"
     return "\n".join([
         "---",
         "license: mit",
@@ -65,36 +87,45 @@ def model_card(folder: Path, name: str) -> str:
         "",
         f"# {name}",
         "",
-        f"This policy {does} in `{policy.environment}` of BirthSIM {__version__}, at {1 / policy.settings.policy_period:g} Hz.",
-        f"It was trained by {made}, with {worlds}.",
-        f"It takes {policy.network.inputs} observations and gives {policy.network.outputs} actions.",
+        f"This policy {'drives the valves by itself' if law == NO_LAW else f'corrects the controller `{law}`'} "
+        f"in `{policy.environment}` of BirthSIM {__version__}, at {1 / policy.settings.policy_period:g} Hz.",
+        f"It was trained by {made}, with `sensors={about['sensors']!r}`, `randomize={about['randomize']}`.",
+        f"It takes {network.inputs} observations and gives {network.outputs} actions.",
         "",
         *table,
         "",
-        f"{infeasible} episodes that ask for more than the rig's strength are left out.",
+        f"All met the same worlds: {EPISODES} episodes from seed {SEED}, of the kind that the training had, without those that "
+        "ask for more than the rig's strength. No training, validation or design had them.",
         "",
-        *(f"- {_compared(who, rows, k + 1)}" for k, who in enumerate(others)),
-        "- The best controllers may be better than all of these: `birthsim_env.reference_scores` has their scores.",
-        "- With other sensors, hands and rigs it may be worse than any controller; the command below says so.",
+        *(f"- {_said(who, rows, k)}" for k, who in enumerate(whom) if k),
+        "- A small error renders no stiffness: `birthsim study haptics` measures what a hand feels.",
         "- It is a policy of a simulation. No real rig has run it, and it is no medical device.",
         "",
-        "      birthsim evaluate --controller admittance-adaptive residual --policy FOLDER --out out/compared",
+        f"      birthsim evaluate --controller {' '.join(whom[1:])} residual --policy FOLDER --sensors {about['sensors']}",
         "",
     ])  # fmt: skip
 
 
-def _beside(law: str) -> str:
-    return "shut valves" if law == NO_LAW else "the controller alone"
+def figures(evaluation: Evaluation) -> dict[str, float]:
+    """The figures of a card over the episodes that the rig's strength suffices for; a lost one is infinitely bad."""
+    feasible = np.asarray(evaluation.required_strength_ratio) < 1.0
+    found = {"lost": 100 * float(np.mean(np.asarray(evaluation.lost)[feasible]))}
+    for metric, statistic in (key.split() for key in FIGURES if key != "lost"):
+        sizes = np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost))[feasible]
+        found[f"{metric} {statistic}"] = quantile(sizes, 0.95 if statistic == "q95" else 0.5)
+    return found
 
 
-def _compared(who: str, rows: dict[str, list[float | None]], column: int) -> str:
+def _reads_force(controller: str) -> bool:
+    return is_one_of(controller, FORCE_LAWS) or not controller.startswith(("backstepping", "admittance"))
+
+
+def _said(who: str, rows: dict[str, list[float]], column: int) -> str:
     """In which figures the policy is better and worse than the one of a column."""
-    pairs = {FIGURES[key][0]: (row[0], row[column]) for key, row in rows.items()}
-    known = {name: (ours, theirs) for name, (ours, theirs) in pairs.items() if ours is not None and theirs is not None}
-    better = "; ".join(name for name, (ours, theirs) in known.items() if ours < theirs)
-    worse = "; ".join(name for name, (ours, theirs) in known.items() if ours > theirs)
-    return f"Beside {who} it is better in: {better or 'nothing'}. It is worse in: {worse or 'nothing'}."
+    better = "; ".join(FIGURES[key][0] for key, row in rows.items() if row[0] < row[column])
+    worse = "; ".join(FIGURES[key][0] for key, row in rows.items() if row[0] > row[column])
+    return f"Beside `{who}` it is better in: {better or 'nothing'}. It is worse in: {worse or 'nothing'}."
 
 
-def _number(value: Any) -> str:
-    return "" if value is None else f"{value:.3g}"
+def _number(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "lost" if np.isinf(value) else ""

@@ -9,9 +9,8 @@ Beyond ``SWING`` the valves saturate, and the law by itself keeps up a swing tha
 residual. It then works with less stiffness, until the swing has died.
 """
 
-from baselines.admittance.law import sustained
-from baselines.admittance.rows import HalfWave
 from baselines.backstepping.cartesian_law import across, along
+from baselines.estimation.half_wave import HalfWave, sustained
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact

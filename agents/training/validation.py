@@ -14,7 +14,7 @@ from agents.training.declared import Declared
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.metrics import EpisodeMetrics
 from baselines.bench.statistics import LOST_ERROR, penalize_lost, quantile
-from birthsim_env.success import SETTLED
+from birthsim_env.reward import SETTLED
 
 VALIDATION_SEED = 1_000_000
 """First seed of the validation worlds; evaluation seeds stay below it."""

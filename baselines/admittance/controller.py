@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import knowledge, stage
+from baselines.admittance import knowledge, law
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, check_gains, require_stiffness
@@ -39,6 +39,9 @@ HEAVY = 5.0
 """kg; assumed: the gains were found on rigs up to this mass. The noise of samples moves a head by the more, the more mass times
 gain answers it. With sampled positions and a force sensor, where it learns, a heavier head therefore rests with a gain lower
 by sqrt(HEAVY/mass). At 9 kg it then hunts by 0.6 instead of 1.7 mm. The root was found by trial."""
+
+SWING = 0.015
+"""m/s of the speed error, beyond which a loop that knows the hand by friction alone is calmed at rest; found by trial."""
 
 MOST_BIAS = 2.0
 """assumed: a force sensor's bias is at most so many times that believed."""
@@ -69,6 +72,9 @@ class AdmittanceController(StagedController):
             pistons, which nothing else separates from the hand, and yields faster to large oscillations. From samples and a
             force it also learns that the rig is lighter than believed (``inertia``). Only then does it read an acceleration
             sensor, where positions are samples and the rig as believed has one; such a loop needs no mass.
+        identified: without a force sensor: whether the friction believed is the rig's to 5 %, as after ``birthsim identify``.
+            Then a resting hand is found by the bristles and the head rests quietly; with half that friction it wanders by
+            10 mm. An acceleration sensor makes no use of it.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests; less for a rig above ``HEAVY``.
             rest_push: by how much the position error of a resting piston is multiplied.
@@ -104,14 +110,17 @@ class AdmittanceController(StagedController):
     }
 
     def __init__(
-        self, parameters: Parameters | str | Path | None = None, force_sensor: bool = True, learn: bool = True, **gains: float
-    ) -> None:
+        self, parameters: Parameters | str | Path | None = None, force_sensor: bool = True, learn: bool = True,
+        identified: bool = False, **gains: float,
+    ) -> None:  # fmt: skip
         check_gains(self, gains)
-        check_flags({"force_sensor": force_sensor, "learn": learn})
+        check_flags({"force_sensor": force_sensor, "learn": learn, "identified": identified})
+        if identified and force_sensor:
+            raise ValueError(f"identified = {identified!r} with a force sensor; allowed: only where force_sensor is False")
         if gains.get("yielding", 1.0) > 1:
             raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
         super().__init__(parameters)
-        self._force_sensor, self._learn = bool(force_sensor), bool(learn)
+        self._force_sensor, self._learn, self._identified = bool(force_sensor), bool(learn), bool(identified)
         self._own = gains
 
     @property
@@ -137,17 +146,24 @@ class AdmittanceController(StagedController):
             tuned, least, falls = {**tuned, "rest_gain": lighter * tuned["rest_gain"]}, SAMPLED_LEAST, MOST_FALLS
         g = {**tuned, **self._own}
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
-        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, "least_fraction": least, "most_falls": falls, **g}
+        follow = {
+            "pneumatic_gain": PNEUMATIC_GAIN,
+            "quickness": quickness,
+            "least_fraction": least,
+            "most_falls": falls,
+            "swing": 0.0 if inert or self._force_sensor else SWING,
+            **g,
+        }
         about = knowledge.beliefs(
             rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
-            learns_mass=sampled and learns_force, weighed=inert and not self._force_sensor,
+            identified=self._identified, learns_mass=sampled and learns_force, weighed=inert and not self._force_sensor,
             believed_limit=knowledge.BELIEVED_LIMIT if inert or fixed else knowledge.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )  # fmt: skip
         constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
-        law = LawStage(stage.control, constants, knowledge.fresh_memory(rig, sampled))
-        return [inertial.law_stage(rig), law] if inert else [law]
+        own = LawStage(law.control, constants, knowledge.fresh_memory(rig, sampled))
+        return [inertial.law_stage(rig), own] if inert else [own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         require_stiffness(reference, 0.0)

@@ -14,6 +14,7 @@ from typing import Any
 from baselines.admittance.rows import Beliefs, Follower, Known, Memory, Watch
 from baselines.estimation import (
     admittance,
+    bristle_observer,
     chamber_observer,
     disturbance_observer,
     force_bias,
@@ -114,6 +115,9 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         place, pressures = int(about.place), memory.chambers.pressure
         moving = Moving(seen.rows[place : place + Moving.size])
         inertial_force.observe(memory.hand, memory.hold, seen.time, moving, joints, pressures, belief.rig, belief.period, fresh)
+    elif about.identified > 0.0:
+        pressures, noise = memory.chambers.pressure, known.given.noise
+        bristle_observer.observe(memory.hand, memory.felt, seen, memory.pistons, joints, pressures, noise, belief, fresh)
     elif about.force_sensor == 0.0:
         force_observer.observe(memory.hand, seen.time, joints, known.unexplained, belief.rig, belief.period, fresh)
 
@@ -138,7 +142,7 @@ def know(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> int:
 def fresh_memory(rig: Parameters, sampled: bool) -> Array:
     """``Memory`` of a lane that starts."""
     whole, pistons = Watch.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
-    follower = Follower.lane(across=whole, along=whole)
+    follower = Follower.lane(across=whole, along=whole, calm_across=whole, calm_along=whole)
     mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
     return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
 
@@ -153,6 +157,12 @@ def beliefs(rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, flo
         **{"belief": observers.belief(rig, gains["bandwidth"]), "compliance": stages.compliance(rig), "place": POSITION},
         **{"sampled": sampled, "force_sensor": True, "learns_noise": False, "rows_of_memory": len(fresh_memory(rig, sampled))},
         **{"trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period)},
-        **{"friction_fraction": gains["friction_fraction"], "friction_rate": 0.0, "most_bias": 0.0, "weighed": False},
+        **{
+            "friction_fraction": gains["friction_fraction"],
+            "friction_rate": 0.0,
+            "most_bias": 0.0,
+            "weighed": False,
+            "identified": False,
+        },
         **{"learns_mass": False, "believed_limit": BELIEVED_LIMIT, **others},
     }

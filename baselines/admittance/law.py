@@ -1,4 +1,4 @@
-"""A stiff loop that follows a reference motion through friction, as a kernel over lanes.
+"""A stiff loop that follows a reference motion through friction, as a stage of the closed loop.
 
 The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
     j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
@@ -10,49 +10,38 @@ with the forces unseen of ``knowledge``: believed friction and what an observer 
   noise a slow average leaves must not wear the friction down.
 - ``watch`` lowers c across or along cylinder 2 where the loop oscillates in that direction: the rig is then slower, lighter
   or held more stiffly than believed.
+- ``calm`` lowers c for a while where the loop swings at rest, if nothing but friction tells the law of the hand.
 - Position errors count up to ``MOST_ERROR``, so that the loop comes back calmly from a load that was beyond its strength.
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
-from baselines.admittance.rows import Gains, HalfWave, Known, Memory, Watch
+from baselines.admittance import knowledge
+from baselines.admittance.rows import Constants, Follower, Gains, Known, Memory, Watch
 from baselines.backstepping.cartesian_law import across, along, load_rates
+from baselines.estimation.half_wave import sustained
 from baselines.estimation.rows import Belief
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Motion
+from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.dynamics import load
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
 
+LEAST_CALM, CALMED, CALM_TIME = 0.55, 0.85, 0.4
+"""What is left of the gain of a loop that swings while its motion goes nowhere, at least and after each half wave, and s until
+it is back. Found by trial: without a force sensor a stiff hand makes a resting head swing at 14 Hz, and friction ends that."""
+
+NOWHERE, DRIFTING = 8e-3, 3.0
+"""m/s and 1/s: a motion goes nowhere while its velocity, low-passed, is below; found by trial."""
+
 MOST_ERROR = 0.006
 """m; assumed: no position error counts for more. A larger one, left by a load beyond what the cylinders can hold, is closed at
 a speed of c MOST_ERROR/3, which saturated valves can still stop; else the loop swings between its limits."""
-
-HALF_WAVE = 0.2
-"""s: a longer half wave of the speed error is no oscillation of the loop."""
-
-SUSTAINED = 0.75
-"""A half wave of at least this fraction of the one before is sustained; a transient dies faster."""
-
-
-@helper
-def sustained(wave: HalfWave, i: int, error: float, period: float, level: float, before: float) -> float:
-    """Size of a sustained half wave of a speed error beyond ``level`` that has just ended, else zero.
-
-    One is sustained where the half wave before it went beyond ``before``.
-    """
-    extreme = wave.extreme[i]
-    wave.since[i] += period
-    if error * extreme < 0.0:
-        peak = abs(extreme) if wave.since[i] < HALF_WAVE else 0.0
-        last = wave.peak[i]
-        wave.extreme[i], wave.since[i], wave.peak[i] = error, 0.0, peak
-        return peak if peak > level and last > before and peak > SUSTAINED * last else 0.0
-    if abs(error) > abs(extreme):
-        wave.extreme[i] = error
-    return 0.0
 
 
 @helper
@@ -64,6 +53,26 @@ def watch(watched: Watch, i: int, error: float, period: float, gains: Gains) -> 
         fraction = max(gains.least_fraction, gains.yielding * fraction)
     watched.fraction[i] = fraction
     return fraction
+
+
+@helper
+def calm(watched: Watch, i: int, error: float, period: float, gains: Gains) -> float:
+    """Gain fraction, lowered by each sustained half wave of a speed error beyond ``swing``, which comes back."""
+    fraction: float = watched.fraction[i] + period / CALM_TIME * (1.0 - watched.fraction[i])
+    if sustained(watched, i, error, period, gains.swing, 0.0) > 0.0:
+        fraction = max(LEAST_CALM, CALMED * fraction)
+    watched.fraction[i] = fraction
+    return fraction
+
+
+@helper
+def going(follower: Follower, i: int, motion: Motion, period: float) -> float:
+    """How far the motion of lane ``i`` goes anywhere, 0 to 1."""
+    square = 0.0
+    for axis in range(2):
+        follower.drift[axis, i] += period * DRIFTING * (motion.velocity[axis, i] - follower.drift[axis, i])
+        square += follower.drift[axis, i] ** 2
+    return min(1.0, square / (NOWHERE * NOWHERE))
 
 
 @helper
@@ -83,7 +92,7 @@ def jerk_for(acceleration: float, speed: float, position: float, c: float) -> fl
 
 @helper
 def beyond(error: float, zone: float) -> float:
-    """What of ``error`` exceeds +-``zone``."""
+    """What of ``error`` exceeds +-``zone``: a dead zone keeps integral action from hunting against stiction."""
     return error - max(-zone, min(zone, error))
 
 
@@ -127,6 +136,10 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         fraction_n = watch(follower.along, i, dn, period, gains)
         follower.moved[i] = max(known.given.moving[i], follower.moved[i] * exact.exp(-period / MOTION_TIME))
         c = gains.rest_gain + (gains.gain - gains.rest_gain) * follower.moved[i]
+        if gains.swing > 0.0:
+            gone = going(follower, i, motion, period)
+            fraction_t *= gone + (1.0 - gone) * calm(follower.calm_across, i, dt, period, gains)
+            fraction_n *= gone + (1.0 - gone) * calm(follower.calm_along, i, dn, period, gains)
         et = (1.0 + (gains.rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * gains.dead_zone)
         en = (1.0 + (gains.rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * gains.dead_zone)
         et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))
@@ -144,3 +157,14 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         p2, n2 = pressure_openings(rate2, stiffness[1, i], stiffness_rate[1, i], c4, second, p)
         for valve, wanted in ((0, p1), (1, n1), (2, p2), (3, n2)):
             seen.opening[valve, i] = lead(wanted, memory.chambers.spool[valve, i], kept, gains.quickness)
+
+
+@kernel
+def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    """One control period of a block; returns how many stiffness setpoints are not positive definite."""
+    signals, known = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n])
+    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+    missed = knowledge.know(signals, own, known, about)
+    command(signals, own, known, about.gains, about.belief)
+    load(signals.opening, 0, n, own.chambers.opening)
+    return missed

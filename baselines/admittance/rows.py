@@ -1,23 +1,17 @@
 """Rows of the admittance law: what it remembers, what it knows at one instant, and its constants."""
 
 from baselines.estimation.admittance import Compliance
+from baselines.estimation.bristle_observer import Felt
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.half_wave import HalfWave
 from baselines.estimation.held_force import Hold
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
-
-
-class HalfWave(Rows):
-    """The half wave of a speed error that is under way, and the one before."""
-
-    extreme = row("m/s", "largest error of this half wave")
-    since = row("s", "since it began")
-    peak = row("m/s", "largest error of the last one")
 
 
 class Watch(HalfWave):
@@ -31,6 +25,9 @@ class Follower(Rows):
 
     across = part(Watch, "across cylinder 2")
     along = part(Watch, "along cylinder 2")
+    calm_across = part(Watch, "across cylinder 2, at rest")
+    calm_along = part(Watch, "along cylinder 2, at rest")
+    drift = rows("vx vy", "m/s", "low-passed velocity of the motion")
     moved = row("1", "how far the motion was moving of late, 0 to 1")
 
 
@@ -47,6 +44,7 @@ class Memory(Rows):
     friction = part(Friction, "level of friction")
     inertia = part(Inertia, "mass")
     hand = part(Hand, "force of the hand without a sensor")
+    felt = part(Felt, "the same where friction is known")
     hold = part(Hold, "whether the head rests, without a force sensor")
     follower = part(Follower, "loop")
     pistons = part(Pistons, "observer")
@@ -71,6 +69,7 @@ class Beliefs(Numbers):
     sampled = number("1", "1 where positions are samples")
     force_sensor = number("1", "1 with a force sensor")
     weighed = number("1", "1 where an acceleration sensor tells the hand's force")
+    identified = number("1", "1 where friction is known and tells the hand's force")
     believed_limit = number("N", "that is believed to act unseen on a piston, at most")
     learns_noise = number("1", "1 where the tracker's noise is learned")
     place = number("1", "row of ``Seen`` at which a ``Point`` stands")
@@ -92,6 +91,7 @@ class Gains(Numbers):
     dead_zone = number("m", "of a resting piston's position error")
     quickness = number("1", "fraction of the way that a spool is taken in a period")
     oscillation = number("m/s", "speed error beyond which sustained half waves lower c")
+    swing = number("m/s", "speed error beyond which sustained half waves lower c at rest for a while; 0: none do")
     yielding = number("1", "what such a half wave leaves of c")
     least_fraction = number("1", "what is left of c at least")
     most_falls = number("1", "times that a half wave lowers c at most: one n times ``oscillation`` lowers it n times")

@@ -9,6 +9,7 @@ import numpy as np
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.backstepping.impedance import paper_impedance
+from baselines.backstepping.law import Options, Terms
 from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import check_flags
 from baselines.estimation.observers import measured_joints
@@ -22,6 +23,7 @@ from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, part
 from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, shown
 
@@ -30,6 +32,9 @@ PNEUMATIC_GAIN = 30.0
 
 SIGN_WIDTH = 0.002
 """m/s; assumed: over this speed the law's sign(v) goes from rest to sliding; close to the paper's discontinuous sign."""
+
+STEP = 1e-4
+"""s; half the distance of the central difference that gives the rates of the gains, exact to 1e-7 of them."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +60,31 @@ class LawTerms:
 class Constants(Numbers):
     """Of the stage."""
 
-    options = part(backstepping_law.Options, "of the law")
+    options = part(Options, "of the law")
     rig = part(Rig, "the rig as described")
 
 
 @kernel
 def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
     return backstepping_law.command(seen, Estimate(seen.handed[: Estimate.size]).joints, about.rig, about.options, n)
+
+
+@kernel
+def _inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms) -> None:
+    """Writes what goes on inside ``command`` in N lanes, for analysis."""
+    n, ratio = joints.rows.shape[1], options.damping_ratio
+    moved, ahead, behind = (
+        Joints(joints.rows.copy()),
+        Terms(terms.rows.copy()),
+        Terms(terms.rows.copy()),
+    )
+    for fraction, there in ((1.0, ahead), (-1.0, behind)):
+        moved.position[:] = joints.position + fraction * STEP * joints.speed
+        backstepping_law.choose_gains(moved, seen.asked, seen.damping_factor, p, ratio, there, n)
+    terms.gain_rates.rows[:] = (ahead.gains.rows - behind.gains.rows) / (2.0 * STEP)
+    piston_reference(seen.asked.rows, p, terms.wanted.rows, n)
+    backstepping_law.choose_gains(joints, seen.asked, seen.damping_factor, p, ratio, terms, n)
+    backstepping_law.law(seen, joints, terms, p, options, n)
 
 
 class BacksteppingController(StagedController):
@@ -118,7 +141,7 @@ class BacksteppingController(StagedController):
         self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
-        self._options = backstepping_law.Options.numbers(
+        self._options = Options.numbers(
             pneumatic_gain=pneumatic_gain, sign_width=sign_width, weight=self.weight_compensation,
             coulomb_rate=not frozen_friction, damping_ratio=damping_ratio or 0.0, one_valve=valves == "one_valve",
             force_first=self.force_first,
@@ -172,8 +195,8 @@ class BacksteppingController(StagedController):
         lanes = self._joints.shape[1]
         seen, joints = Seen(np.zeros((Seen.size, lanes))), Joints(self._joints.copy())
         seen.rows[:ASKED], seen.rows[ASKED:ACTION] = self._seen, self._asked
-        terms = backstepping_law.Terms(np.zeros((backstepping_law.Terms.size, lanes)))
-        backstepping_law.inspect(seen, joints, Rig(self._p), backstepping_law.Options(self._options), terms)
+        terms = Terms(np.zeros((Terms.size, lanes)))
+        _inspect(seen, joints, Rig(self._p), Options(self._options), terms)
         gains, rates = (one.rows.reshape(3, 2, lanes) for one in (terms.gains, terms.gain_rates))
         intent = terms.intent
         return LawTerms(

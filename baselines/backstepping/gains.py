@@ -104,15 +104,9 @@ def least_stiffness(apparent_mass: float, viscous: float) -> float:
     A setpoint below it leaves the cubic without a positive root above Fv/(3 m_e).
     """
     drag = viscous / apparent_mass
-    # d/dc = 0: (3 c^2 + 2)(3 c - drag) = 3 (c^3 + 2 c), a cubic in c with one root above drag/3.
-    low, high = drag / 3, max(drag, 1.0)
-    for _ in range(200):
-        c = (low + high) / 2
-        if (3 * c * c + 2) * (3 * c - drag) < 3 * (c**3 + 2 * c):
-            low = c
-        else:
-            high = c
-    return apparent_mass * (high**3 + 2 * high) / (3 * high - drag) if drag > 0 else 2 * apparent_mass / 3
+    # d/dc = 0: (3 c^2 + 2)(3 c - drag) = 3 (c^3 + 2 c), a cubic in c with one real root, above drag/3.
+    c = float(np.roots([6, -3 * drag, 0, -2 * drag]).real.max())
+    return apparent_mass * (c**3 + 2 * c) / (3 * c - drag) if drag > 0 else 2 * apparent_mass / 3
 
 
 def least_damping(stiffness: float, apparent_mass: float, viscous: float) -> float:

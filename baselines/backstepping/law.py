@@ -26,9 +26,10 @@ from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.inverse_kinematics import piston_reference
 
 
@@ -86,15 +87,12 @@ class Terms(Rows):
     wanted = part(Wanted, "reference")
     needs = part(Needs, "of the gains")
     gains = part(Gains, "gains")
-    gain_rates = part(Gains, "their rates at constant setpoints; ``inspect`` alone writes them")
+    gain_rates = part(Gains, "their rates at constant setpoints, where they are inspected")
     intent = part(Intent, "what the law wants")
 
 
 LEAST_FACTOR = 1.01
 """Damping relative to equal gains. Below this ratio equal gains are used, since other positive gains may not exist."""
-
-STEP = 1e-4
-"""s; half the distance of the central difference that gives the rates of the gains, exact to 1e-7 of them."""
 
 
 @helper
@@ -247,8 +245,7 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Rig, options: Options, n: i
             + (sliding * p.fc1 * smooth_sign_slope(v1, width) + p.fv1) * a1
             - m * gravity * kappa * (growth * sine + cosine * turn)
         )
-        # F* takes off what is believed, and dF*/dt its rate.
-        star1_rate -= believed.rate[0, i]
+        star1_rate -= believed.rate[0, i]  # as F* takes off what is believed
         z2 = v1 - vd1 + gains.c1[0, i] * (y1 - yd1)
         intent.force_rate[0, i] = star1_rate - mass1 * z2 - gains.c3[0, i] * (net1 - star1)
 
@@ -299,21 +296,5 @@ def command(seen: Seen, joints: Joints, p: Rig, options: Options, n: int) -> int
     misses = choose_gains(joints, seen.asked, seen.damping_factor, p, options.damping_ratio, terms, n)
     law(seen, joints, terms, p, options, n)
     openings_for(seen, joints, terms.intent, p, options, openings, n)
-    for valve in range(4):
-        for i in range(n):
-            seen.opening[valve, i] = openings.opening[valve, i]
+    load(openings.opening, 0, n, seen.opening)
     return misses
-
-
-@kernel
-def inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms) -> None:
-    """Writes what goes on inside ``command`` in N lanes, for analysis."""
-    n, ratio = joints.rows.shape[1], options.damping_ratio
-    moved, ahead, behind = Joints(joints.rows.copy()), Terms(terms.rows.copy()), Terms(terms.rows.copy())
-    for fraction, there in ((1.0, ahead), (-1.0, behind)):
-        moved.position[:] = joints.position + fraction * STEP * joints.speed
-        choose_gains(moved, seen.asked, seen.damping_factor, p, ratio, there, n)
-    terms.gain_rates.rows[:] = (ahead.gains.rows - behind.gains.rows) / (2.0 * STEP)
-    piston_reference(seen.asked.rows, p, terms.wanted.rows, n)
-    choose_gains(joints, seen.asked, seen.damping_factor, p, ratio, terms, n)
-    law(seen, joints, terms, p, options, n)

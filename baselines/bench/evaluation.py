@@ -2,8 +2,10 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, Unpack
 
 import gymnasium
@@ -15,10 +17,13 @@ from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller, Law, controller_of
-from baselines.staged import driving
+from baselines.staged import Driving, driving
+from baselines.tables import aligned, markdown
 from birthsim_env.assembly import Arguments, spelled_out
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.values import shown
+from birthsim_env.simulation import Simulation
 
 LANES = 256
 """Episodes that run side by side."""
@@ -27,7 +32,7 @@ AT_ONCE = 250
 """Control periods between two looks at what is lost, where nothing stops the loop."""
 
 TIMED = 10
-"""Calls of a controller, at least, over which its time is taken; a compiled one is called when its episodes are over."""
+"""Calls of a controller, at least, over which its time is taken."""
 
 
 @dataclass
@@ -81,7 +86,7 @@ def evaluate(
     lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
     episodes that are complete are returned.
     """
-    if episodes < 1:
+    if not (isinstance(episodes, int) and episodes >= 1):
         raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")
     return evaluate_worlds(environment, controller, name, range(seed, seed + episodes), None, progress, **arguments)
 
@@ -91,6 +96,9 @@ def evaluate_worlds(
     **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
+    if arguments.get("device") is not None:
+        said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
+        raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]
     result, law, first = Evaluation(name), controller_of(controller), 0
     spent: list[float] = []
     try:
@@ -146,9 +154,7 @@ def _run_batch(
             break
         bar.update(steps)
     bar.close()
-    while len(driver.spent) < TIMED:
-        driver.openings(simulation.plant, simulation.measurement, simulation.reference)
-    spent += driver.spent
+    spent += times_of(driver, simulation)
     env.close()
     for name, values in figures_of(own, period).items():
         result.metrics[name] += values.tolist()
@@ -161,65 +167,60 @@ def _run_batch(
     result.traces.append(measures.error.transpose(0, 2, 1))
 
 
+def times_of(driver: Driving, simulation: Simulation) -> list[float]:
+    """What calls of a controller took, us per lane, ``TIMED`` at least: one that was compiled into a loop is called now."""
+    while len(driver.spent) < TIMED:
+        driver.openings(simulation.plant, simulation.measurement, simulation.reference)
+    return driver.spent
+
+
 def overview(evaluations: list[Evaluation]) -> str:
     """A short table for the screen: settled error over the episodes, mm, and how many were lost."""
-    width = max(24, *(len(one.controller) for one in evaluations))
-    lines = [f"{'settled error, mm':{width}}{'median':>10}{'95 %':>10}{'largest':>10}{'lost episodes':>18}"]
+    rows, unsaid = [], []
     for one in evaluations:
         summary = summarize(penalize_lost(one.metrics["settled_rms"], one.lost, applies=True))
-        figures = "".join(f"{number(summary[key]):>10}" for key in ("median", "q95", "max"))
-        lines.append(f"{one.controller:{width}}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
-        unsaid = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())
-        if unsaid:
-            # A hand that jumps all the time leaves nothing settled.
-            lines.append(f"{'':{width}}{unsaid} of {len(one.lost)} episodes were never settled and are left out above")
-    return "\n".join(lines)
-
-
-def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
-    """A Markdown table: a row per metric that says something; per controller its ``statistic``, 95 % and largest value.
-
-    "lost" stands where a lost episode makes a figure infinite.
-    """
-    head = ["metric", "unit"]
-    for evaluation in evaluations:
-        head += [f"{evaluation.controller}: {statistic}", "95 %", "max"]
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    summaries = [evaluation.summary() for evaluation in evaluations]
-    for name, unit in UNITS.items():
-        if all(np.isnan(summary[name]["max"]) for summary in summaries):
-            continue
-        row = [name, unit]
-        for summary in summaries:
-            row += [number(summary[name][key]) for key in (statistic, "q95", "max")]
-        lines.append("| " + " | ".join(row) + " |")
-    lost, success, paid = ["lost episodes", ""], ["successful episodes", ""], ["return, mean", ""]
-    for evaluation in evaluations:
-        lost += [f"{sum(evaluation.lost)} of {len(evaluation.lost)}", "", ""]
-        success += [f"{sum(evaluation.success)} of {len(evaluation.success)}", "", ""]
-        paid += [f"{np.mean(evaluation.returns[1.0] or [np.nan]):.4g}", "", ""]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in (lost, success, paid))])
+        figures = [number(summary[key]) for key in ("median", "q95", "max")]
+        rows.append([one.controller, *figures, f"{sum(one.lost)} of {len(one.lost)}"])
+        # A hand that jumps all the time leaves nothing settled.
+        never = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())
+        if never:
+            unsaid.append(f"{one.controller}: {never} of {len(one.lost)} episodes were never settled and are left out above")
+    return "\n".join([aligned(("settled error, mm", "median", "95 %", "largest", "lost episodes"), rows), *unsaid])
 
 
 DATA = ("metric", "unit", "controller", "value", "q95", "max")
 """Columns: the median over the episodes, their 95th percentile and the largest; of lost and successful episodes the number."""
 
 
-def data(evaluations: Sequence[Evaluation]) -> str:
-    """CSV with the columns ``DATA``; metrics of which the environment says nothing are left out, "lost" is infinite."""
-    summaries = [evaluation.summary() for evaluation in evaluations]
-    rows: list[Sequence[str]] = [DATA]
+def _figures(evaluations: Sequence[Evaluation]) -> Iterator[tuple[str, ...]]:
+    """Rows of ``DATA``, metric by metric; those of which the environment says nothing are left out, "lost" is infinite."""
+    summaries = [one.summary() for one in evaluations]
     for name, unit in UNITS.items():
-        if all(np.isnan(summary[name]["max"]) for summary in summaries):
-            continue
-        for evaluation, summary in zip(evaluations, summaries, strict=True):
-            rows.append([name, unit, evaluation.controller, *(number(summary[name][key]) for key in ("median", "q95", "max"))])
+        if not all(np.isnan(summary[name]["max"]) for summary in summaries):
+            for one, summary in zip(evaluations, summaries, strict=True):
+                yield name, unit, one.controller, *(number(summary[name][key]) for key in ("median", "q95", "max"))
     for name, kept in (("lost episodes", "lost"), ("successful episodes", "success")):
         for one in evaluations:
             values = getattr(one, kept)
-            rows.append([name, f"of {len(values)}", one.controller, str(sum(values)), "", ""])
+            yield name, f"of {len(values)}", one.controller, str(sum(values)), "", ""
     for one in evaluations:
-        rows.append(["return, mean", "", one.controller, f"{np.mean(one.returns[1.0] or [np.nan]):.4g}", "", ""])
+        yield "return, mean", "", one.controller, f"{np.mean(one.returns[1.0] or [np.nan]):.4g}", "", ""
+
+
+def table(evaluations: Sequence[Evaluation]) -> str:
+    """The figures in Markdown: a row per metric, three columns per controller."""
+    head = ["metric", "unit", *(text for one in evaluations for text in (f"{one.controller}: median", "95 %", "max"))]
+    lines = []
+    for name, rows in groupby(_figures(evaluations), key=itemgetter(0)):
+        line = [name, UNITS.get(name, "")]
+        for _, unit, _, value, *others in rows:
+            line += [value if line[1] else f"{value} {unit}".rstrip(), *others]
+        lines.append(line)
+    return markdown(head, lines)
+
+
+def data(evaluations: Sequence[Evaluation]) -> str:
+    """The figures as CSV with the columns ``DATA``."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([DATA, *_figures(evaluations)])
     return text.getvalue()

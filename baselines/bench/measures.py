@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.bench.metrics import Tally, fresh_tally, sample, window
-from birthsim_env import reward, success
+from birthsim_env import reward
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import compliance
@@ -18,6 +18,7 @@ from birthsim_env.outcome import Ends
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.compiled.records import Numbers, number, part, row, rows
+from birthsim_env.physics.dynamics import load
 from birthsim_env.simulation import Simulation
 
 DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
@@ -35,7 +36,7 @@ class Memory(Tally):
     state = rows(STATES, "SI", "where the episode began")
     motion = rows(4, "SI", "of the end effector there")
     owed = part(reward.Owed, "for the reward")
-    calm = part(success.Tally, "for success")
+    calm = part(reward.Tally, "for success")
     success = row("1", "1 where the episode is successful so far")
     fallen = row("1", "1 where the lane has left the physical range")
     weight = rows(len(DISCOUNTS), "1", "of the next reward, for each of ``DISCOUNTS``")
@@ -71,8 +72,7 @@ def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
             for axis in range(2):
                 errors[number // every, axis, i] = now.tracking_error[axis, i]
         world.impact[0, i], world.impact[1, i] = 0.0, 0.0
-        for k in range(4):
-            own.command[k, i] = seen.opening[k, i]
+    load(seen.opening, 0, n, own.command)
     sample(now, own.command, about.limits.period, own, kept, n)
     return 0
 
@@ -82,14 +82,12 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
     terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), Ends(scratch(Ends.size)), seen.reference
     failed = ends.failed
     reward.assess(world, reference, own.owed, own.command, own.last, about.limits, terms, failed, n)
-    success.add(world, reference, failed, own.calm, ends.success, n)
+    reward.add(world, reference, failed, own.calm, ends.success, n)
     for i in range(n):
         paid = terms.total[i] if own.alive[i] > 0.0 else 0.0
         for k in range(len(DISCOUNTS)):
             own.returns[k, i] += own.weight[k, i] * paid
             own.weight[k, i] *= about.discounts[k]
-        for k in range(4):
-            own.last[k, i] = own.command[k, i]
         if failed[i] > 0.0:
             own.alive[i], own.fallen[i] = 0.0, 1.0
             for k in range(STATES):
@@ -97,6 +95,7 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
             for k in range(4):
                 world.motion.rows[k, i] = own.motion[k, i]
         own.success[i] = ends.success[i] * own.alive[i]
+    load(own.command, 0, n, own.last)
     return 0
 
 

@@ -10,7 +10,7 @@ from birthsim_env.info import Info
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
-from birthsim_env.success import SETTLED
+from birthsim_env.reward import SETTLED
 
 QUIET = 1.0
 """s for which reference, force and setpoints must have been constant before motion counts as hunting."""

@@ -2,21 +2,19 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import gymnasium
 import numpy as np
 from cyclopts import Parameter
 from PIL import Image
 from tqdm import tqdm
 
+from baselines.commands.episodes import driven
 from baselines.commands.settings import CONTROLLER, RANDOMIZE, Env, Parts, Randomize, RigFile, Seed, Sensors, Set, number
-from baselines.commands.worlds import check_environment, policy_of, with_options
-from baselines.registry import make_controller
-from baselines.staged import NO_ACTION, driving
-from birthsim_env.drawing.rendering import PairRenderer, Scene
+from baselines.commands.worlds import check_environment, with_options
+from baselines.staged import NO_ACTION
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.files import make_folder, whole_file
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
@@ -99,12 +97,14 @@ def draw(
     errors: list[Array] = [np.array(one.errors) for one in takes]
     seen: Array = np.concatenate(errors)
     top = 1e-3 * float(np.ceil(1.05e3 * seen[np.isfinite(seen)].max(initial=0.5e-3)))
-    renderer = PairRenderer(rig, title, names, span, top)
+    from birthsim_env.drawing.pair import Pair  # late: it loads pygame
+
+    pair = Pair(rig, title, names, span, top)
     times = np.array([span[0] + SAMPLE * k for k in range(len(errors[0]))])
     frames = []
     for k, scenes in enumerate(zip(*(one.scenes for one in takes), strict=True)):
         until = round(k / rate / SAMPLE) + 1
-        frames.append(Image.fromarray(renderer.frame(scenes, times[:until], [error[:until] for error in errors])))
+        frames.append(Image.fromarray(pair.frame(scenes, times[:until], [error[:until] for error in errors])))
         progress(1)
     return frames
 
@@ -134,20 +134,17 @@ def main(settings: Settings) -> None:
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .webp or .gif")
     rig = load_parameters(settings.parameters)
     check_environment(settings.env)
-    make = partial(
-        gymnasium.make, settings.env, parameters=rig, sensors=settings.sensors, randomize=RANDOMIZE[settings.randomize],
-        policy_period=rig.electronics.control_period, **settings.parts(),
-    )  # fmt: skip
-    longest = make().get_wrapper_attr("duration")
+    names, randomize = with_options(settings.controller, settings.set), RANDOMIZE[settings.randomize]
+    envs = [
+        driven(settings.env, name, rig, sensors=settings.sensors, randomize=randomize, **settings.parts()) for name in names
+    ]
+    longest = envs[0].get_wrapper_attr("duration")
     if not 0 <= span[0] < span[1] <= longest or span[1] - span[0] < 1:
         raise ValueError(f"--begin {span[0]:g} --end {span[1]:g}; allowed: from 0 to {longest:g} s, a second apart or more")
-    names = with_options(settings.controller, settings.set)
-    options = [{"policy": policy_of(settings.env)} if name == "residual" else {} for name in names]
-    laws = [driving(make_controller(name, rig, **own), name) for name, own in zip(names, options, strict=True)]
-    print(described(rig, RANDOMIZE[settings.randomize], settings.sensors))
+    print(described(rig, randomize, settings.sensors))
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
-        takes = [take(make(actuation=law), settings.seed, span, settings.rate, bar.update) for law in laws]
+        takes = [take(env, settings.seed, span, settings.rate, bar.update) for env in envs]
     title = f"{takes[0].scenes[0].title}, in real time"
     with tqdm(total=len(takes[0].scenes), desc="drawing", unit=" frames", leave=False) as bar:
         frames = draw(takes, rig, title, names, span, settings.rate, bar.update)

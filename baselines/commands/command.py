@@ -64,6 +64,8 @@ def _read_and_act(app: App, action: Callable[[Any], None]) -> None:
         given = app(sys.argv[1:])
     except CycloptsError as error:
         said, option = " ".join(str(error).split()).rstrip("."), error.argument.name if error.argument else ""
+        if isinstance(error, MissingArgumentError) and option not in sys.argv:
+            said = f"{option} is missing"
         place = "" if option.lstrip("-") in said else f"{option}: "
         missing = isinstance(error, MissingArgumentError | UnknownOptionError | UnusedCliTokensError)
         known = f"; allowed: what {app.name[0]} --help lists" * missing

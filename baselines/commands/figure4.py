@@ -4,21 +4,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 from PIL import Image
-from tqdm import tqdm
 
 import birthsim_env
+from baselines.commands.episodes import driven, record
 from baselines.commands.settings import Configured, Controller, RigFile, Sensors, Set
-from baselines.commands.tables import aligned
 from baselines.commands.worlds import with_options
 from baselines.registry import make_controller
-from baselines.staged import NO_ACTION, driving
+from baselines.tables import aligned
 from birthsim_env.files import make_folder, whole_file, whole_results, write_json
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.success import SETTLED
+from birthsim_env.reward import SETTLED
 
 PICTURE: dict[str, Any] = {"render_mode": "rgb_array", "picture_size": (1280, 960)}
 PICTURE_TIME = 1.8
@@ -51,28 +49,14 @@ def record_run(
     ``picture`` is where to save what the rig looks like during the first push.
     """
     rig = load_parameters(parameters)
-    period = rig.electronics.control_period
-    law = driving(make_controller(controller, rig), controller)
-    env = gymnasium.make(
-        "BirthSIM/Circle-v1", parameters=rig, sensors=sensors, policy_period=period, actuation=law, **PICTURE
-    )  # fmt: skip
-    _, info = env.reset(seed=0)
-    record: dict[str, list[Any]] = {**{name: [info[name]] for name in FIELDS}, "lost": [False]}
-    ended = False
-    with tqdm(desc="Fig. 4", unit=" steps", leave=False) as bar:
-        while not ended:
-            _, _, terminated, truncated, info = env.step(NO_ACTION)
-            for name in FIELDS:
-                record[name].append(info[name])
-            record["lost"].append(terminated)
-            ended = terminated or truncated
-            if len(record["time"]) % 500 == 0:
-                bar.update(500)
-            if picture is not None and len(record["time"]) == round(PICTURE_TIME / period):
-                with whole_file(picture) as file:
-                    Image.fromarray(np.asarray(env.render())).save(file, format="png")
-    env.close()
-    return {name: np.array(values) for name, values in record.items()}
+    env = driven("BirthSIM/Circle-v1", controller, rig, sensors=sensors, **PICTURE)
+
+    def look(rows: int) -> None:
+        if picture is not None and rows == round(PICTURE_TIME / rig.electronics.control_period):
+            with whole_file(picture) as file:
+                Image.fromarray(np.asarray(env.render())).save(file, format="png")
+
+    return record(env, 0, FIELDS, "Fig. 4", look)
 
 
 def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[str, Any]:

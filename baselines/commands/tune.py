@@ -15,37 +15,35 @@ gains of a file. The next trials are drawn at random; Optuna's TPE sampler propo
 from __future__ import annotations
 
 import math
-import os
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.bench.evaluation import evaluate
+from baselines.bench.pieces import controller_settings, file_hash
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
 from baselines.commands.settings import CONTROLLER, WORLD, Kind, Parts, RigFile, Seed, Set, whole
-from baselines.commands.tables import aligned
 from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
+from baselines.tables import aligned
+from baselines.work.tasks import Task, result_of
 from birthsim_env.files import own_folder, whole_results, write_json
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.reading import read_json
-from birthsim_env.physics.rig.values import is_finite, is_within, problem, shown
+from birthsim_env.physics.rig.values import is_within, shown
 
 if TYPE_CHECKING:
     from optuna import Study
-    from optuna.storages import JournalStorage
-    from optuna.trial import FrozenTrial
 
 TUNED_FOR = ("ideal", "lab")
 """Sensors that the laws' published gains were tuned for."""
@@ -130,93 +128,46 @@ def costs(
     return parts
 
 
-def check_optuna() -> None:
-    """Raises ``ValueError`` where Optuna is missing, before anything is made."""
+def costs_of(
+    controller: str, rig: dict[str, Any], own: dict[str, Any], sensors: list[str], lanes: int, gains: Gains, **_: Any
+) -> dict[str, float]:
+    """``costs`` of a controller by name with ``gains``; what else is given only tells trials apart."""
+    believed = Parameters.from_dict(rig)
+    return costs(make_controller(controller, believed, **gains), believed, tuple(sensors), lanes, **own)
+
+
+def begun(start: Gains) -> Study:
+    """A search whose first trial is ``start``; ``ValueError`` where Optuna is missing."""
     try:
-        import optuna  # noqa: F401
+        import optuna
     except ImportError as error:
         raise ValueError(f"{error}; tuning needs the extra: pip install 'birthsim[tune]'") from error
-
-
-def open_journal(path: Path) -> JournalStorage:
-    """Optuna's journal at ``path``, without a last line that has no end, as a killed process may have left it."""
-    from optuna.storages import JournalStorage
-    from optuna.storages.journal import JournalFileBackend
-
-    if path.exists():
-        os.truncate(path, path.read_bytes().rfind(b"\n") + 1)
-    # Optuna's own lock file outlives a process that is killed: the folder has one owner already.
-    return JournalStorage(JournalFileBackend(str(path), cast(Any, threading.Lock())))
-
-
-def open_study(folder: Path, setting: dict[str, Any]) -> Study:
-    """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
-    import optuna
-
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    path = folder / "trials.journal"
-    try:
-        study = optuna.create_study(storage=open_journal(path), study_name="birthsim-tune", load_if_exists=True)
-        # The first run may have been killed before it came to all of them.
-        known = {**({} if complete(study) else setting), **study.user_attrs}
-        if all(known.get(key) == value for key, value in setting.items()):
-            for key, value in setting.items():
-                study.set_user_attr(key, value)
-            listed(study)
-            return study
-    except (MemoryError, OSError):
-        raise
-    except Exception as error:
-        # Damage trips Optuna in a dozen ways.
-        raise ValueError(
-            f"{path} is no list of trials ({problem(error)}); allowed: what birthsim tune wrote, or another --out"
-        ) from error
-    key = next(key for key, value in setting.items() if known.get(key) != value)
-    raise ValueError(f"{path} has {key} = {shown(known.get(key))}; allowed: {shown(setting[key])}, or another --out")
-
-
-def complete(study: Study) -> list[FrozenTrial]:
-    """The trials that have a cost; an interrupted one has none and says nothing."""
-    from optuna.trial import TrialState
-
-    return study.get_trials(states=(TrialState.COMPLETE,))
-
-
-def listed(study: Study) -> list[dict[str, Any]]:
-    """The complete trials as JSON: gains, cost and its parts; ``ValueError`` for one that birthsim tune did not write."""
-    trials = []
-    for trial in complete(study):
-        parts = trial.user_attrs.get("parts")
-        if not (isinstance(parts, dict) and all(map(is_finite, parts.values())) and is_finite(trial.value)):
-            raise ValueError(f"trial {trial.number} has no cost in parts")
-        trials.append({"gains": trial.params, "cost": trial.value, "parts": parts})
-    return trials
+    study = optuna.create_study()
+    study.enqueue_trial(start)
+    return study
 
 
 def search(
-    study: Study, name: str, rig: Parameters, start: Gains, bounds: Bounds, sensors: tuple[str, ...], lanes: int, seed: int,
-    count: int, own: dict[str, Any],
-) -> Iterator[None]:  # fmt: skip
-    """Run the trials that the study lacks of ``count``, one by one."""
+    study: Study, folder: Path, setting: dict[str, Any], bounds: Bounds, seed: int, count: int
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    """``count`` trials, one by one, as gains, cost and its parts; those of this ``setting`` in ``folder`` are not run again."""
     from optuna.distributions import BaseDistribution, FloatDistribution
     from optuna.samplers import TPESampler
-    from optuna.trial import TrialState
 
     ranges: dict[str, BaseDistribution] = {
         gain: FloatDistribution(low, high, log=low > 0) for gain, (low, high) in bounds.items()
     }
-    while (done := len(complete(study))) < count:
-        if done == 0 and not study.get_trials(deepcopy=False, states=(TrialState.WAITING,)):
-            study.enqueue_trial(start)
-        # A sampler of its own for each trial: what it proposes depends on the seed and the complete trials alone, so that an
+    for number in range(count):
+        # A sampler of its own for each trial: what it proposes depends on the seed and the trials before alone, so that an
         # interrupted search goes on as if it had not been interrupted.
-        own_seed = int(np.random.SeedSequence([seed, done]).generate_state(1)[0])
+        own_seed = int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
         study.sampler = TPESampler(seed=own_seed, n_startup_trials=RANDOM, constant_liar=False)
         trial = study.ask(ranges)
-        parts = costs(make_controller(name, rig, **trial.params), rig, sensors, lanes, **own)
-        trial.set_user_attr("parts", parts)
-        study.tell(trial, sum(parts.values()))
-        yield
+        parts = result_of(Task(f"trials/{number}", costs_of, {**setting, "gains": trial.params}), folder)
+        cost = sum(parts.values())
+        study.tell(trial, cost)
+        yield {"gains": trial.params, "cost": cost, "parts": parts}
 
 
 @dataclass(kw_only=True)
@@ -238,7 +189,7 @@ class Settings(Parts):
     """Rigs of each scenario."""
     parameters: RigFile = None
     out: Path
-    """Folder for trials.journal, trials.json and gains.json."""
+    """Folder for trials, trials.json and gains.json."""
 
 
 def main(settings: Settings) -> None:
@@ -249,35 +200,34 @@ def main(settings: Settings) -> None:
     bounds = {name: pair for name, pair in bounds_of(controller, rig).items() if name not in split_options(controller)[1]}
     start = start_of(settings.start, bounds)
     setting = {
-        "controller": controller, **own, "seed": settings.seed, "sensors": list(sensors), "lanes": settings.lanes,
-        "bounds": {name: list(pair) for name, pair in bounds.items()}, "start": start, "rig": rig.to_dict(),
+        **controller_settings(controller, rig), "own": own, "files": [*map(file_hash, own.values())],
+        "sensors": list(sensors), "lanes": settings.lanes,
     }  # fmt: skip
     check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
+    trials: list[dict[str, Any]] = []
+    interrupt: KeyboardInterrupt | None = None
+    study = begun(start)
     print(described(rig, True))
-    check_optuna()
     with own_folder(settings.out) as folder:
-        study = open_study(folder, setting)
-        kept = len(complete(study)[: settings.trials])
-        bar = tqdm(total=settings.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
-        interrupt: KeyboardInterrupt | None = None
         try:
-            numbers = (settings.lanes, settings.seed, settings.trials)
-            for _ in search(study, controller, rig, start, bounds, sensors, *numbers, own):
-                bar.set_postfix_str(f"best {study.best_value:.3g} mm", refresh=False)
-                bar.update()
+            with tqdm(total=settings.trials, desc=f"tuning {controller}", unit=" trials", leave=False) as bar:
+                for trial in search(study, folder, setting, bounds, settings.seed, settings.trials):
+                    trials.append(trial)
+                    bar.set_postfix_str(f"best {min(one['cost'] for one in trials):.3g} mm", refresh=False)
+                    bar.update()
         except KeyboardInterrupt as error:
-            if not (kept := len(complete(study))):
+            if not trials:
                 raise
             interrupt = error
-            print(f"interrupted: {kept} of {settings.trials} trials are kept; the same command carries on")
-        finally:
-            bar.close()
-        trials = listed(study)[: settings.trials]
+            print(f"interrupted: {len(trials)} of {settings.trials} trials are kept; the same command carries on")
         first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
         place = {"trial": trials.index(best), "trials": len(trials)}
+        asked = {
+            **setting, "seed": settings.seed, "bounds": {name: list(pair) for name, pair in bounds.items()}, "start": start,
+        }  # fmt: skip
         with whole_results(folder) as results:
-            write_json(results / "trials.json", {**setting, "trials": trials})
-            write_json(results / "gains.json", {**setting, **best, **place})
+            write_json(results / "trials.json", {**asked, "trials": trials})
+            write_json(results / "gains.json", {**asked, **best, **place})
     print(f"{controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
     spent = [{**one["parts"], "sum": one["cost"]} for one in (first, best)]
     print(aligned(("cost, mm", "start", "best"), [(part, *(f"{one[part]:.3f}" for one in spent)) for part in spent[0]]))

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 
 from baselines.figures.style import COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, look, save
 from baselines.identification.identified import Identified
+from baselines.identification.log_file import CHAMBERS
 from birthsim_env.physics.compiled.lanes import Array
 
-CHAMBERS = ("P1", "N1", "P2", "N2")
 LAGS = 40
 """Rows up to which residuals are compared with themselves."""
 

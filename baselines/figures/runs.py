@@ -25,7 +25,7 @@ from baselines.figures.style import (
     save,
 )
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.success import SETTLED
+from birthsim_env.reward import SETTLED
 
 
 def figure4(record: dict[str, Array], folder: Path) -> list[Path]:

@@ -97,10 +97,6 @@ class Slopes:
 
 def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Slopes:
     """The slopes at start states ``free`` (W, 14)."""
-    return Slopes(*_slopes(windows, noise, rig, free))
-
-
-def _slopes(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> tuple[Array, Array]:
     count = len(FREE)
     several = np.repeat(free[None], 1 + count, axis=0)
     several[1:] += DIFFERENCE * np.eye(count)[:, None]
@@ -109,7 +105,7 @@ def _slopes(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> tup
     # Cholesky's triangle is that of QR in a tenth of the time; the rows of ``SPREAD`` keep the matrix well conditioned.
     triangle = np.linalg.cholesky(slopes.transpose(0, 2, 1) @ slopes).transpose(0, 2, 1)
     basis = slopes @ np.linalg.inv(triangle)
-    return np.asarray(basis, dtype=np.float64), np.asarray(triangle, dtype=np.float64)
+    return Slopes(np.asarray(basis, dtype=np.float64), np.asarray(triangle, dtype=np.float64))
 
 
 def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes: Slopes | None) -> tuple[Array, Array]:
@@ -134,7 +130,8 @@ def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes:
         scale[left] = np.where(better, np.minimum(1.0, 2.0 * scale[left]), 0.25 * scale[left])
         slow = ~(slopes.step(residual[left])[1] < SHRINKS * length)
         if slow.any():
-            slopes.basis[slow], slopes.triangle[slow] = _slopes(part.some(slow), noise, rig, free[left[slow]])
+            anew = slopes_at(part.some(slow), noise, rig, free[left[slow]])
+            slopes.basis[slow], slopes.triangle[slow] = anew.basis, anew.triangle
     return free, residual
 
 

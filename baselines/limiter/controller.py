@@ -37,6 +37,7 @@ from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
@@ -150,11 +151,9 @@ def limit(world: int, seen: Seen, memory: int, about: Limits, tables: int, lane:
     if about.capacity < math.inf:
         _joints(seen, about, True, False, here, n)
         _joints(seen, about, True, True, there, n)
+        load(seen.pressure, 0, n, now.pressure)
+        load(seen.user_force, 0, n, now.force.rows)
         for i in range(n):
-            for chamber in range(4):
-                now.pressure[chamber, i] = seen.pressure[chamber, i]
-            for axis in range(2):
-                now.force.rows[axis, i] = seen.user_force[axis, i]
             late = (seen.time[i] - seen.position_time[i]) / about.period
             recall(tank.past, tank.newest, slots, late, now.rows, then.rows, i)
             count_work(tank.energy, seen, then.force.rows, work, i)

@@ -17,12 +17,13 @@ from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
+from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph, Value
-from birthsim_env.physics.gradients.runge_kutta import STAGES, ahead_of, weight_of
 from birthsim_env.physics.gradients.source import HEAD, loop, module_of
 from birthsim_env.physics.gradients.symbols import empty, inputs
 from birthsim_env.physics.gradients.tracing import call
+from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 NODES = 7
 """Nodes of the horizon."""
@@ -193,13 +194,9 @@ def step_to(
 ) -> None:  # fmt: skip
     """Takes ``x`` (8, n) and ``flows`` (4, n) to node ``k``; ``points`` (STAGES POINT, n) get rates and slopes."""
     step, kept = about.step[k], about.kept[k]
-    for row in range(STATE):
-        for i in range(n):
-            total[row, i] = x[row, i]
     trial = scratch(STATE)
-    for row in range(STATE):
-        for i in range(n):
-            trial[row, i] = x[row, i]
+    load(x, 0, n, total)
+    load(x, 0, n, trial)
     for stage in range(STAGES):
         left = 1.0 if stage == 0 else kept * kept if stage == 3 else kept
         for chamber in range(FLOWS):
@@ -214,12 +211,8 @@ def step_to(
             for i in range(n):
                 total[row, i] += weight * point[row, i]
                 trial[row, i] = x[row, i] + ahead * point[row, i]
-    for row in range(STATE):
-        for i in range(n):
-            x[row, i] = total[row, i]
-    for chamber in range(FLOWS):
-        for i in range(n):
-            flows[chamber, i] = q[chamber, i]
+    load(total, 0, n, x)
+    load(q, 0, n, flows)
 
 
 @helper
@@ -230,12 +223,10 @@ def _tangent_step(
     where it is this step's ``own``, else towards 0."""
     step, kept, end = about.step[k], about.kept[k], 1.0 if own else 0.0
     trial = scratch(MOVING)
+    load(s, 0, n, total)
     for row in range(STATE + FLOWS):
         for i in range(n):
             trial[row, i] = s[row, i] if row < STATE else 0.0
-    for row in range(STATE):
-        for i in range(n):
-            total[row, i] = s[row, i]
     for stage in range(STAGES):
         left = 1.0 if stage == 0 else kept * kept if stage == 3 else kept
         for i in range(n):
@@ -247,9 +238,7 @@ def _tangent_step(
             for i in range(n):
                 total[row, i] += weight * out[row, i]
                 trial[row, i] = s[row, i] + ahead * out[row, i]
-    for row in range(STATE):
-        for i in range(n):
-            s[row, i] = total[row, i]
+    load(total, 0, n, s)
 
 
 @helper

@@ -18,9 +18,10 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
+from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracked
-from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
+from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -131,27 +132,17 @@ class LinearQuadratic(TrackingController):
     """
 
     LAW, CONSTANTS = staticmethod(control), Constants
-    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
-        "integral_tolerance": (1e-6, 1e-3),
-        "position_tolerance": (3e-4, 1e-1),
-        "speed_tolerance": (1e-2, 3.0),
-        "force_tolerance": (1.0, 100.0),
-        "friction_fraction": (0.0, 1.0),
-        "dead_zone": (0.0, 5e-4),
+    GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
+        "integral_tolerance": (1e-6, 1e-3, 1.828e-05, 2.639e-05),
+        "position_tolerance": (3e-4, 1e-1, 0.001036, 0.0003),
+        "speed_tolerance": (1e-2, 3.0, 0.3138, 0.2182),
+        "force_tolerance": (1.0, 100.0, 5.517, 1.6),
+        "friction_fraction": (0.0, 1.0, 0.865, 0.9396),
+        "dead_zone": (0.0, 5e-4, 0.0, 0.0001245),
     }
-    TUNED: ClassVar[dict[str, dict[str, float]]] = {
-        "ideal": {
-            "integral_tolerance": 1.828e-05, "position_tolerance": 0.001036, "speed_tolerance": 0.3138,
-            "force_tolerance": 5.517, "friction_fraction": 0.865, "dead_zone": 0.0,
-        },
-        "lab": {
-            "integral_tolerance": 2.639e-05, "position_tolerance": 0.0003, "speed_tolerance": 0.2182,
-            "force_tolerance": 1.6, "friction_fraction": 0.9396, "dead_zone": 0.0001245,
-        },
-    }  # fmt: skip
 
     def _design(self, gains: dict[str, float]) -> dict[str, Any]:
-        mass, tolerances = self.parameters.mechanics.mass, np.array([gains[name] for name in list(self.TUNABLE)[:4]])
+        mass, tolerances = self.parameters.mechanics.mass, np.array([gains[name] for name in list(self.GAINS)[:4]])
         low, high = kappa_range(self.parameters)
         grid = np.linspace(low, high, SCHEDULE)
         first = [regulator(mass, self.parameters.cylinder1.viscous_friction, kappa, tolerances) for kappa in grid]

@@ -15,8 +15,9 @@ second started from what the first had found:
 
 from typing import ClassVar
 
+from baselines.admittance.law import beyond
 from baselines.rivals.feedforward import Tracked
-from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
+from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import CylinderAir, air_at, driving_flows
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import valves
@@ -99,24 +100,14 @@ class PositionPID(TrackingController):
     """
 
     LAW, CONSTANTS = staticmethod(control), Constants
-    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
-        "bandwidth": (15.0, 100.0),
-        "damping": (0.1, 2.0),
-        "integral_rate": (0.5, 30.0),
-        "pressure_gain": (40.0, 400.0),
-        "friction_fraction": (0.0, 1.0),
-        "dead_zone": (0.0, 5e-4),
+    GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
+        "bandwidth": (15.0, 100.0, 73.04, 44.27),
+        "damping": (0.1, 2.0, 0.4617, 0.5684),
+        "integral_rate": (0.5, 30.0, 30.0, 9.951),
+        "pressure_gain": (40.0, 400.0, 395.6, 340.8),
+        "friction_fraction": (0.0, 1.0, 0.8704, 0.8328),
+        "dead_zone": (0.0, 5e-4, 0.0, 7.737e-06),
     }
-    TUNED: ClassVar[dict[str, dict[str, float]]] = {
-        "ideal": {
-            "bandwidth": 73.04, "damping": 0.4617, "integral_rate": 30.0, "pressure_gain": 395.6,
-            "friction_fraction": 0.8704, "dead_zone": 0.0,
-        },
-        "lab": {
-            "bandwidth": 44.27, "damping": 0.5684, "integral_rate": 9.951, "pressure_gain": 340.8,
-            "friction_fraction": 0.8328, "dead_zone": 7.737e-06,
-        },
-    }  # fmt: skip
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
         return {name: gains[name] for name in Constants.groups if name in gains}

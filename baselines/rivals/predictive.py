@@ -33,6 +33,7 @@ from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.compiled.records import part
+from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.rig.parameters import Parameters
 
 __all__ = ["GENERATED", "NonlinearMPC"]
@@ -58,13 +59,11 @@ def foresee(seen: Seen, memory: Memory, known: Known, about: Constants, given: S
     """Writes all of ``given`` but the present flows: friction follows the motion, what was observed besides stays."""
     ticks, steps, n = about.horizon.tick, about.horizon.step, memory.fresh.shape[0]
     offset, bristles = Point(scratch(Point.size)[:, :n]), scratch(2)[:, :n]
-    for row in range(4):
-        for i in range(n):
-            given.joints.rows[row, i], given.pressure[row, i] = memory.joints.rows[row, i], memory.chambers.pressure[row, i]
-            offset.rows[row, i] = memory.offset.rows[row, i]
-    for row in range(2):
-        for i in range(n):
-            given.force[row, i], bristles[row, i] = known.given.force[row, i], memory.bristle[row, i]
+    load(memory.joints.rows, 0, n, given.joints.rows)
+    load(memory.chambers.pressure, 0, n, given.pressure)
+    load(memory.offset.rows, 0, n, offset.rows)
+    load(known.given.force, 0, n, given.force)
+    load(memory.bristle, 0, n, bristles)
     admittance.forecast(offset, seen.asked, known.given.force, about.compliance, ticks, given.motion)
     reference_friction.forecast(given.motion, about.belief.rig, steps, bristles, given.unseen)
     for k in range(NODES):
@@ -120,9 +119,7 @@ def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, 
     flow_ranges(given.pressure, own.chambers.spool, about.belief.rig, low, high, given.flow)
     improve(plan, given, low, high, about, n)
     openings_for_flows(plan[:FLOWS, :n], given.pressure, about.belief.rig, own.chambers.opening)
-    for valve in range(4):
-        for i in range(n):
-            signals.opening[valve, i] = own.chambers.opening[valve, i]
+    load(own.chambers.opening, 0, n, signals.opening)
     # The plan as the next period will see it: each step's flow moves towards that of the next.
     for k in range(NODES - 1):
         fraction = about.belief.period / about.horizon.step[k]

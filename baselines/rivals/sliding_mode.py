@@ -15,9 +15,10 @@ These commands found the gains (with ideal, then with lab) by the search that bi
 
 from typing import ClassVar
 
+from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracked
-from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
+from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import kernel
@@ -81,23 +82,13 @@ class SlidingMode(TrackingController):
     """
 
     LAW, CONSTANTS = staticmethod(control), Constants
-    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
-        "surface_rate": (10.0, 100.0),
-        "reaching_rate": (100.0, 10000.0),
-        "layer_rate": (10.0, 200.0),
-        "friction_fraction": (0.0, 1.0),
-        "dead_zone": (0.0, 5e-4),
+    GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
+        "surface_rate": (10.0, 100.0, 72.36, 28.38),
+        "reaching_rate": (100.0, 10000.0, 2607.0, 955.9),
+        "layer_rate": (10.0, 200.0, 14.79, 46.51),
+        "friction_fraction": (0.0, 1.0, 0.2856, 0.7042),
+        "dead_zone": (0.0, 5e-4, 1.763e-05, 0.0002013),
     }
-    TUNED: ClassVar[dict[str, dict[str, float]]] = {
-        "ideal": {
-            "surface_rate": 72.36, "reaching_rate": 2607.0, "layer_rate": 14.79, "friction_fraction": 0.2856,
-            "dead_zone": 1.763e-05,
-        },
-        "lab": {
-            "surface_rate": 28.38, "reaching_rate": 955.9, "layer_rate": 46.51, "friction_fraction": 0.7042,
-            "dead_zone": 0.0002013,
-        },
-    }  # fmt: skip
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
         return {"pneumatic_gain": PNEUMATIC_GAIN, **{name: gains[name] for name in Constants.groups if name in gains}}

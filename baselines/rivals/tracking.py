@@ -25,12 +25,6 @@ class Integrals(Rows):
 
 
 @helper
-def beyond(error: float, zone: float) -> float:
-    """What of ``error`` exceeds +-``zone``: the dead zone that keeps integral action from hunting against stiction."""
-    return error - max(-zone, min(zone, error))
-
-
-@helper
 def held(memory: Integrals, cylinder: int, i: int, first: float) -> float:
     """The integral of a cylinder, or ``first`` where it starts."""
     return first if memory.fresh[cylinder, i] > 0.0 else memory.integral[cylinder, i]
@@ -51,13 +45,12 @@ class TrackingController(StagedController, ABC):
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
-        gains: those of ``TUNABLE``, SI units; what is not given is the value tuned for the sensors that the controller meets.
+        gains: those of ``GAINS``, SI units; what is not given is the value tuned for the sensors that the controller meets.
 
-    ``TUNABLE`` is what ``birthsim tune`` reads: gain -> (lowest, highest) to try; ``TUNED`` holds what it found, for exact and
-    for sampled positions. All have ``friction_fraction``, how much believed Coulomb friction is fed forward with the sign
-    of the reference speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The
-    integrals start from the forces that the chambers hold (bumpless start). From sampled positions an observer estimates
-    the speeds.
+    ``GAINS`` is gain -> (lowest, highest, for exact, for sampled positions): what ``birthsim tune`` is to try and what it
+    found. All have ``friction_fraction``, how much believed Coulomb friction is fed forward with the sign of the reference
+    speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The integrals start from the
+    forces that the chambers hold (bumpless start). From sampled positions an observer estimates the speeds.
     ``LAW`` is the law as a stage, which carries its ``Integrals`` on. ``CONSTANTS`` are its constants: the control ``period``,
     s, what ``_design`` gives, and the ``rig``.
     Raises ``ValueError`` for unknown gains and for gains that are not positive (zero where the lowest to try is zero).
@@ -65,16 +58,20 @@ class TrackingController(StagedController, ABC):
 
     LAW: ClassVar[Callable[..., int]]
     CONSTANTS: ClassVar[type[Numbers]]
+    GAINS: ClassVar[dict[str, tuple[float, float, float, float]]]
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
-    TUNED: ClassVar[dict[str, dict[str, float]]]
     COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ("damping_factor",)
+
+    def __init_subclass__(cls) -> None:
+        if "GAINS" in vars(cls):
+            cls.TUNABLE = {name: row[:2] for name, row in cls.GAINS.items()}
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         check_gains(self, gains)
         super().__init__(parameters)
-        chosen = {kind: {name: float({**tuned, **gains}[name]) for name in self.TUNABLE} for kind, tuned in self.TUNED.items()}
-        self._fractions = {kind: values["friction_fraction"] for kind, values in chosen.items()}
-        self._designs = {kind: self._design(values) for kind, values in chosen.items()}
+        # For exact and for sampled positions.
+        self._gains = [{name: float(gains.get(name, row[2 + k])) for name, row in self.GAINS.items()} for k in range(2)]
+        self._designs = [self._design(values) for values in self._gains]
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
@@ -82,13 +79,14 @@ class TrackingController(StagedController, ABC):
 
     @abstractmethod
     def _design(self, gains: dict[str, float]) -> dict[str, Any]:
-        """The constants of ``LAW`` that come from the gains, all those of ``TUNABLE``."""
+        """The constants of ``LAW`` that come from the gains, all those of ``GAINS``."""
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
-        rig, kind = self.parameters, "lab" if sampled else "ideal"
-        about = self.CONSTANTS.numbers(period=rig.electronics.control_period, rig=self._p, **self._designs[kind])
+        rig, gains, design = self.parameters, self._gains[sampled], self._designs[sampled]
+        about = self.CONSTANTS.numbers(period=rig.electronics.control_period, rig=self._p, **design)
         law = LawStage(self.LAW, about, Integrals.lane(fresh=1.0))
-        return [compliant_motion(rig), pistons(rig, sampled, informed=True), feedforward(rig, self._fractions[kind]), law]
+        ahead = feedforward(rig, gains["friction_fraction"])
+        return [compliant_motion(rig), pistons(rig, sampled, informed=True), ahead, law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the first lane whose stiffness is not positive definite."""

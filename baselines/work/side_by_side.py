@@ -139,8 +139,8 @@ def _on_cluster(work: Work, pieces: Pieces, cluster: str) -> Outcomes:
     except (OSError, ValueError) as error:
         said = f"--cluster {cluster!r}: no cluster answers there ({error}); allowed: ray, or ray:HOST:PORT of one"
         raise ValueError(said) from error
-    remote, waiting = ray.remote(num_cpus=1)(_numbered), list[Any]()
     try:
+        remote = ray.remote(num_cpus=1)(_numbered)
         waiting = [remote.remote(work, k, piece) for k, piece in enumerate(pieces)]
         while waiting:
             ready, waiting = ray.wait(waiting, timeout=0.5)  # s, since a signal waits no longer
@@ -150,6 +150,4 @@ def _on_cluster(work: Work, pieces: Pieces, cluster: str) -> Outcomes:
     except ray.exceptions.RayError as error:
         raise OSError(f"a worker of the cluster has died ({type(error).__name__}); what is complete is kept") from error
     finally:
-        for one in waiting:
-            ray.cancel(one, force=True)
-        ray.shutdown()
+        ray.shutdown()  # which ends what is not ready

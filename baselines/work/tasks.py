@@ -63,11 +63,8 @@ def run_tasks(
     results = {name: result for name, path in paths.items() if (result := _read(path)) is not None}
     missing = [task for task in tasks if task.name not in results]
     failures: dict[str, str] = {}
-    stale = sum(any(paths[task.name].parent.glob(f"{paths[task.name].stem[:-16]}{'?' * 16}.json")) for task in missing)
     if results:
         print(f"{title}: {len(results)} of {len(tasks)} are there with these settings, rig and code, and are kept")
-    if stale:
-        print(f"{title}: {stale} are there with other settings, rig or code, and are computed anew")
     with tqdm(total=len(tasks), initial=len(results), desc=title, unit="piece", disable=not missing) as bar:
 
         def take(number: int, outcome: Result | str) -> None:
@@ -89,6 +86,14 @@ def run_tasks(
             print(f"{title}: {len(results)} of {len(tasks)} are complete and kept; the same command goes on")
             raise
     return {task.name: results[task.name] for task in tasks if task.name in results}, failures
+
+
+def result_of(task: Task, folder: Path) -> Result:
+    """The result of one task: from ``folder`` where that holds it, else worked out here, and then written there."""
+    path = folder / task.file()
+    if _read(path) is None:
+        _write(path, task, task.work(**task.settings))
+    return _read(path) or {}
 
 
 def _write(path: Path, task: Task, result: Result) -> None:

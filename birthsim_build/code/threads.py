@@ -14,7 +14,8 @@ from birthsim_build.code.tape import begin_tape, keep
 from birthsim_env.loop.loop import load_rows, store_rows
 from birthsim_env.loop.rows import WORLD
 from birthsim_env.loop.stage import call, carray, pointer
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.loop.world import Start
+from birthsim_env.physics.compiled.compilation import helper, kernel
 
 MAGIC = 0x31_73_64_61_65_72_68_74
 """First word of a program: the version of this format, "threads1"."""
@@ -27,9 +28,12 @@ order; and the word at which the way back is described (``tape``), 0 where there
 
 MOVE, STAGE, FILL, RELOCATION = 4, 6, 4, 3
 """Words of each. A move: address of an array (rows, lanes), its rows, the first row of a lane's memory, whether it is written.
-A stage: number of its function, 1 if it closes a policy step, 1 if it sees the world, the first row of what it remembers;
+A stage: number of its function, when it runs, 1 if it sees the world, the first row of what it remembers;
 addresses of its constants and of what describes its tables. A fill: first row of an array in the data, its numbers of 32 bits
 before and behind its lanes, and the word at which those of a lane that begins are. A relocation: see ``place``."""
+
+TIMES = PERIOD, CLOSES, BEGINS = range(3)
+"""When a stage runs: in every control period, at the end of a policy step, where an episode begins."""
 
 IN_PROGRAM, IN_DATA, COUNT = range(3)
 """Kinds of relocation: the address of a word of the program, that of a row of the data, the number of lanes."""
@@ -52,13 +56,10 @@ def place(program: int, lane: int, data: int, lanes: int) -> int:
     return 0
 
 
-@kernel
-def fill(program: int, lane: int, unused: int, also_unused: int) -> int:
-    """A lane begins as the program says."""
+@helper
+def _fill(program: int, lane: int) -> None:
     head = words(program, HEAD)
     lanes, first = head[LANES], HEAD + MOVE * head[MOVES] + STAGE * head[STAGES]
-    if lane >= lanes:
-        return 0
     for k in range(head[FILLS]):
         row, before, behind, at = words(program + 8 * (first + FILL * k), FILL)
         begun = carray(pointer(program + 8 * at, np.int32), (before, behind))
@@ -66,7 +67,40 @@ def fill(program: int, lane: int, unused: int, also_unused: int) -> int:
         for j in range(before):
             for i in range(behind):
                 array[j, lane, i] = begun[j, i]
+
+
+@kernel
+def fill(program: int, lane: int, unused: int, also_unused: int) -> int:
+    """A lane begins as the program says."""
+    if lane < words(program, HEAD)[LANES]:
+        _fill(program, lane)
     return 0
+
+
+@kernel
+def begin(program: int, k: int, chosen: int, count: int, space: int, dispatch: int) -> int:
+    """An episode begins in one of ``count`` lanes, with its memory at the address ``space``.
+
+    At the address ``chosen`` are words (1 + ``Start.size``, count): numbers of the lanes, and a ``Start`` of each, which the
+    stages that begin episodes share as their memory. ``dispatch`` is as for ``advance``."""
+    if k >= count:
+        return 0
+    head, lane, missed = words(program, HEAD), words(chosen + 8 * k, 1)[0], 0
+    _fill(program, lane)
+    moves = carray(pointer(program + 8 * HEAD, np.int64), (head[MOVES], MOVE))
+    rows, first = carray(pointer(space, np.float64), (head[SPACE], 1)), program + 8 * (HEAD + MOVE * head[MOVES])
+    load_rows(moves, head[LANES], lane, 1, rows)
+    begun = False
+    for s in range(head[STAGES]):
+        number, when, sees, memory, constants, tables = words(first + 8 * STAGE * s, STAGE)
+        if when == BEGINS:
+            own = space + 8 * memory
+            for j in range(0 if begun else Start.size):
+                words(own + 8 * j, 1)[0] = words(chosen + 8 * (count * (1 + j) + k), 1)[0]
+            begun = True
+            missed += call(dispatch, number, space if sees else 0, space + 8 * WORLD, own, constants, tables, lane)
+    store_rows(moves, head[LANES], lane, 1, rows)
+    return missed
 
 
 @kernel
@@ -89,8 +123,8 @@ def advance(program: int, lane: int, periods: int, tape: int, space: int, dispat
         kept = begin_tape(about, tape, lanes, lane, rows)
     for period in range(periods):
         for s in range(stages):
-            number, closes, sees, memory, constants, tables = words(first + 8 * STAGE * s, STAGE)
-            if closes == 0 or period == periods - 1:
+            number, when, sees, memory, constants, tables = words(first + 8 * STAGE * s, STAGE)
+            if when == PERIOD or (when == CLOSES and period == periods - 1):
                 own, world = space + 8 * memory, space if sees else 0
                 if tape:
                     kept = keep(program, about, head[DATA], tape, lanes, lane, rows, s, 0, kept)
@@ -104,22 +138,24 @@ def advance(program: int, lane: int, periods: int, tape: int, space: int, dispat
 RUNS = ("place", "fill", "advance")
 """What a device is asked to run, each with the address of a program and two whole numbers."""
 
-BACK = "backward"
-"""What it is asked to run besides where there are adjoints, ``code.adjoints.backward``."""
+BEGIN, BACK = "begin", "backward"
+"""What it is asked to run besides where there are stages that begin episodes, and where there are adjoints
+(``code.adjoints.backward``)."""
 
 
 class Threads(NamedTuple):
     """What code needs besides stages where threads run lanes: rows of a lane's memory; for the way back, functions of adjoints
-    (``module:name``) and the rows that they need."""
+    (``module:name``) and the rows that they need; whether episodes begin there."""
 
     space: int
     adjoints: Sequence[str] = ()
     back_space: int = 0
+    begins: bool = False
 
     @property
     def runs(self) -> tuple[str, ...]:
         """Names of what a device is asked to run."""
-        return (*RUNS, BACK) if self.adjoints else RUNS
+        return (*RUNS, *((BEGIN,) if self.begins else ()), *((BACK,) if self.adjoints else ()))
 
 
 def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str], device: bool) -> str:
@@ -129,8 +165,10 @@ def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str
     kernels, which know their thread; elsewhere functions that are told it: thread, block, threads a block.
     """
     wrappers = "\n".join(wrapper(k, symbol, "i64 %lane") for k, symbol in enumerate(symbols))
-    stages, rooms = len(symbols) - len(threads.adjoints), {RUNS[-1]: threads.space, BACK: threads.back_space}
-    entries = "".join(_entry(name, symbol, rooms.get(name, 0)) for name, symbol in zip(threads.runs, kernels, strict=True))
+    stages, own = len(symbols) - len(threads.adjoints), (RUNS[-1], threads.space)
+    rooms = {RUNS[-1]: own, BEGIN: own, BACK: (BACK, threads.back_space)}
+    pairs = zip(threads.runs, kernels, strict=True)
+    entries = "".join(_entry(name, symbol, *rooms.get(name, ("", 0))) for name, symbol in pairs)
     return f"""
 {wrappers}
 {_dispatch(RUNS[-1], range(stages))}
@@ -153,11 +191,11 @@ none:
 }}"""
 
 
-def _entry(name: str, symbol: str, space: int) -> str:
-    """What a thread does: the same code on a device and elsewhere."""
+def _entry(name: str, symbol: str, calls: str, space: int) -> str:
+    """What a thread does, which ``calls`` stages or adjoints: the same code on a device and elsewhere."""
     more, types, room = "", "", ""
     if space:
-        more, types = f", i64 %space, i64 ptrtoint (ptr @{name}_one to i64)", ", i64, i64"
+        more, types = f", i64 %space, i64 ptrtoint (ptr @{calls}_one to i64)", ", i64, i64"
         room = f"  %rows = alloca [{space} x double], align 8\n  %space = ptrtoint ptr %rows to i64\n"
     return f"""
 declare i32 @"{symbol}"(ptr, ptr, i64, i64, i64, i64{types})

@@ -11,8 +11,8 @@ from cyclopts import Parameter
 
 from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
-from baselines.commands.tables import aligned
 from baselines.registry import LISTED
+from baselines.tables import aligned
 from birthsim_build.building import Report, build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import make_bundle, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm

@@ -1,4 +1,4 @@
-"""Episodes whose lanes live on a device: they advance there, and are drawn here, a few at a time."""
+"""Episodes whose lanes live on a device: they begin and advance there."""
 
 from collections.abc import Callable
 from typing import Any, NoReturn
@@ -6,97 +6,79 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_build.device.beginning import beginning_with
 from birthsim_build.device.gradients import DeviceRecorder
 from birthsim_build.device.lanes import Lanes
-from birthsim_build.device.loops import pieces_of
+from birthsim_build.device.loops import SEVERAL
 from birthsim_build.device.machine import machine_named
-from birthsim_build.device.program import Pieces, key_of
+from birthsim_build.device.program import key_of
 from birthsim_env.assembly import Setup, checked_actions
 from birthsim_env.episodes import Episodes, start_of
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.world import Start
 from birthsim_env.physics.compiled.lanes import Array
-
-TOGETHER = 1021
-"""Lanes that begin together; a prime, so that no other axis of an array has this size."""
+from birthsim_env.physics.geometry import inverse_geometry
 
 
 class DeviceEpisodes(Episodes):
-    """``lanes`` lanes on a ``device``; ``assembled`` gives the setup for a number of lanes.
+    """``lanes`` lanes on a ``device``, where they begin and advance; ``assembled`` gives the setup for a number of lanes.
 
-    The lanes of ``simulation`` are those that begin: their worlds are drawn here and copied to the device, where all else
-    happens. Arrays that are returned are on the device.
+    A few lanes here, those of ``simulation``, tell what all of them are made of. Arrays that are returned are on the device.
     """
 
     def __init__(self, device: str, lanes: int, assembled: Callable[[int], Setup]) -> None:
         self._machine = machine_named(device)
         self.arrays = self._machine.arrays
-        self._count, self._together = lanes, min(lanes, TOGETHER)
-        super().__init__(assembled(self._together))
-        pieces_of(self.simulation)  # refuses what is not compiled
-        self._like = Episodes(assembled(1 if self._together > 1 else 2))
-        self.elapsed, self._numbers = self.arrays.zeros(lanes, dtype=np.int64), np.full(lanes, -1)
+        super().__init__(assembled(SEVERAL[0]))
+        other = Episodes(assembled(SEVERAL[1]))
+        self._pieces, self._like = (beginning_with(one) for one in (self, other))
+        self._places = {key_of(array): k for k, array in enumerate(self._pieces.arrays())}
+        self._count, self.elapsed = lanes, self.arrays.zeros(lanes, dtype=np.int64)
+        self._numbers = self.arrays.zeros(lanes, dtype=np.int64) - 1
         self._lanes: Lanes | None = None
         self._recorder: DeviceRecorder | None = None
-        self._shapes: list[tuple[int, ...]] = []
-        self._places: dict[tuple[int, int], int] = {}
-        self._sent: tuple[NDArray[np.intp], Any, list[Any]] | None = None
-        """The lanes that began last, a group of them, there too, and what they began with."""
+
+    def seed(self, seed: int | list[int | None] | None, generator: np.random.Generator) -> None:
+        super().seed(seed, generator)
+        try:
+            words = np.array(self._seeds, dtype=np.uint64)
+        except OverflowError:
+            raise ValueError(f"seed = {max(self._seeds)}; allowed with a device: below 2^64") from None
+        self._entropy = self.arrays.asarray(words.view(np.int64))
 
     def begin(self, lanes: Any, options: dict[str, Any] | None = None, again: bool = False) -> None:
-        position, chosen = start_of(options), np.flatnonzero(self.local(lanes))
-        if again and self._sent and np.array_equal(chosen, self._sent[0]):
-            self._write(*self._sent[1:])
-            return
+        position, xp = start_of(options), self.arrays
+        if position is not None:
+            inverse_geometry(position[:, None], self.simulation.parameters)  # refuses what is out of reach
+        if self._lanes is None:
+            self._make()
+        assert self._lanes is not None, "made above"
+        chosen = xp.flatnonzero(xp.asarray(lanes))
         if not again:
             self._numbers[chosen] += 1
-        for first in range(0, len(chosen), self._together):
-            block = chosen[first : first + self._together]
-            self.begin_first([self._seeds[lane] for lane in block], self._numbers[block], position)
-            self._send(block)
+        start = xp.zeros((Start.size, len(chosen)))
+        named, words = Start(start), Start(start.view(np.int64))
+        words.seed[:], words.episode[:] = self._entropy[chosen], self._numbers[chosen]
+        if position is not None:
+            named.elsewhere[:], named.place[0], named.place[1] = 1.0, float(position[0]), float(position[1])
+        self._lanes.begin(chosen, start)
+        self.elapsed[chosen] = 0
 
-    def _send(self, block: NDArray[np.intp]) -> None:
-        """Give lanes of the device what the first lanes here begin with."""
-        pieces = pieces_of(self.simulation)
-        arrays, there = pieces.arrays(), self.arrays.asarray(block)
-        shapes = [array.shape for array in arrays]
-        if self._lanes is None or shapes != self._shapes:
-            self._make(pieces)
-            self._shapes = shapes
-        assert self._lanes is not None, "made above"
-        self._places = {key_of(array): k for k, array in enumerate(arrays)}
-        columns = [
-            region and self.arrays.array(array[region.at(slice(len(block)))])
-            for region, array in zip(self._lanes.program.regions, arrays, strict=True)
-        ]
-        self._sent = block, there, columns
-        self._write(there, columns)
-
-    def _make(self, pieces: Pieces) -> None:
-        """Make the lanes anew, with what they had."""
-        self._like.begin_first(self._seeds[:1], self._numbers[:1])
-        like, taped = pieces_of(self._like.simulation), None
+    def _make(self) -> None:
+        """Make the lanes, or make them anew with what they had."""
+        taped = None
         if self._recorder is not None:
             self._recorder.prepare()
             taped = self._recorder.loop
-        before, self._lanes = self._lanes, Lanes(self._machine, pieces, like, self._count, taped)
-        # A table may have got room for more; what it had stands first.
-        for view, old in zip(self._lanes.views, before.views if before else (), strict=False):
-            if old is not None:
-                view[tuple(map(slice, old.shape))] = old
+        before, self._lanes = self._lanes, Lanes(self._machine, self._pieces, self._like, self._count, taped)
+        if before is not None:
+            self._lanes.data[...] = before.data
 
     def record(self) -> DeviceRecorder:
         self._recorder = DeviceRecorder(self)
         if self._lanes is not None:
-            self._make(pieces_of(self.simulation))
+            self._make()
         return self._recorder
-
-    def _write(self, there: Any, columns: list[Any]) -> None:
-        """Put what lanes begin with into their data."""
-        assert self._lanes is not None, "lanes have begun"
-        for view, region, column in zip(self._lanes.views, self._lanes.program.regions, columns, strict=True):
-            if region is not None:
-                view[region.at(there)] = column
-        self.elapsed[there] = 0
 
     def there(self, array: NDArray[Any]) -> Any:
         """The array of all lanes, on the device, for one of ``simulation``."""

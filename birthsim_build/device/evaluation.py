@@ -5,8 +5,10 @@ from types import SimpleNamespace
 from typing import Any, Unpack
 
 import gymnasium
+import numpy as np
+from tqdm import tqdm
 
-from baselines.bench.evaluation import AT_ONCE, Evaluation
+from baselines.bench.evaluation import AT_ONCE, Evaluation, times_of
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import figures_of
@@ -22,10 +24,10 @@ from birthsim_env.physics.rig.parameters import load_parameters
 
 @spelled_out("policy_period", "actuation")
 def evaluate_on(
-    device: str, environment: str, controller: Controller | Law, name: str, episodes: int, seed: int,
+    device: str, environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True,
     **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
-    """``evaluate`` on a ``device``: equal in every bit, but that ``cost`` is NaN and that ``traces`` are one.
+    """``evaluate`` on a ``device``: equal in every bit, but that ``traces`` are one. ``cost`` is the controller's time here.
 
     Worlds are drawn here. Raises ``ValueError`` for a controller, or an argument of the environment, that is not compiled.
     """
@@ -37,7 +39,7 @@ def evaluate_on(
     pairs = [(view, array) for view, array in zip(lanes.views, pieces.arrays(), strict=True) if view is not None]
     for view, array in pairs:
         view[...] = machine.arrays.asarray(array)
-    for step in range(0, env.steps, AT_ONCE):
+    for step in tqdm(range(0, env.steps, AT_ONCE), desc=f"{name}, {episodes} episodes", disable=not progress, leave=False):
         missed = lanes.advance(min(AT_ONCE, env.steps - step))
         if missed or step + AT_ONCE >= env.steps:
             for view, array in pairs:
@@ -48,7 +50,8 @@ def evaluate_on(
     metrics = {metric: values.tolist() for metric, values in figures_of(own, simulation.period).items()}
     lost, success = (own.alive == 0.0).tolist(), (own.success > 0.0).tolist()
     traces = [measures.error.transpose(0, 2, 1)]
-    return Evaluation(name, seeds, metrics, lost, asked.tolist(), returns, success, traces=traces)
+    cost = float(np.median(times_of(simulation.actuation, simulation)))
+    return Evaluation(name, seeds, metrics, lost, asked.tolist(), returns, success, cost, traces)
 
 
 def _begun(

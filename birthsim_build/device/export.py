@@ -5,16 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from birthsim_build.bundle import identifier
-from birthsim_build.device.loops import controlled, pieces_of
+from birthsim_build.device.loops import SEVERAL, controlled, pieces_of
 from birthsim_build.device.program import Pieces, Program, key_of, program_of
 from birthsim_build.layout import LAYOUT
 from birthsim_env.episodes import Episodes
 from birthsim_env.files import write_json
 from birthsim_env.loop.rows import WORLD
 from birthsim_env.physics.rig.parameters import Parameters
-
-SEVERAL = (3, 2)
-"""Two numbers of lanes, which tell what lanes have of their own."""
 
 
 def write_programs(

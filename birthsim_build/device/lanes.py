@@ -41,6 +41,11 @@ class Lanes:
             self._words[MISSED] = 0
         return missed
 
+    def begin(self, chosen: Any, starts: Any) -> None:
+        """Begin episodes in lanes whose numbers are ``chosen`` (L,), with a ``Start`` each, ``starts`` (``Start.size``, L)."""
+        words = self._machine.arrays.concatenate([chosen[None], starts.view(np.int64)])
+        self._run("begin", words.shape[1], self._address, self._machine.address(words), words.shape[1])
+
     def back(self, periods: int, tape: Any) -> None:
         """Take the bars on a ``tape``, gradients to the live rows at the end, to the beginning."""
         self._run("backward", self.count, self._address, periods, self._machine.address(tape))

@@ -13,6 +13,9 @@ from birthsim_env.loop.stage import Stage
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Simulation
 
+SEVERAL = (3, 2)
+"""Two numbers of lanes, which tell what lanes have of their own."""
+
 
 def pieces_of(simulation: Simulation, commanded: Sequence[Stage] = (), moved: Sequence[Stage] = ()) -> Pieces:
     """The loop of lanes that have begun; ``ValueError`` names the argument that is a user's Python, which no device runs.

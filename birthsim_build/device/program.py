@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_build.code.tape import ABOUT, CLOSING, LIVE, OPEN
-from birthsim_build.code.threads import COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, RELOCATION, STAGE, Threads
+from birthsim_build.code.threads import COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, RELOCATION, STAGE, TIMES, Threads
 from birthsim_build.image import Words, function_name
 from birthsim_env.loop.gradients.taped import TapedLoop
 from birthsim_env.loop.loop import Place
@@ -26,17 +26,18 @@ HALF = 4
 
 
 class Pieces(NamedTuple):
-    """The arguments of ``Loop``."""
+    """The arguments of ``Loop``, and stages that begin an episode, the first of which remembers a ``Start``."""
 
     world: Sequence[Place]
     seen: Sequence[Place]
     stages: Sequence[Stage]
     closing: Sequence[Stage] = ()
+    beginning: Sequence[Stage] = ()
 
     @property
     def every(self) -> list[Stage]:
         """All stages."""
-        return [*self.stages, *self.closing]
+        return [*self.stages, *self.closing, *self.beginning]
 
     @property
     def functions(self) -> list[str]:
@@ -148,7 +149,7 @@ class _Writer:
                 self.refer(entry_at, IN_PROGRAM, self.put(table))
             else:
                 self.refer(entry_at, IN_DATA, region.first)
-                self.refer(entry_at + 1 + len(region.before), COUNT, 0)
+                self.refer(entry_at + table.ndim - len(region.behind), COUNT, 0)
         return first
 
 
@@ -200,14 +201,15 @@ def program_of(many: Pieces, other: Pieces, functions: Sequence[str], taped: Tap
     of_lanes = sum(key_of(table) in regions for table in tables)
     counts = (len(moves), len(many.every), len(arrays), len(moves) + 2 * len(many.every) + len(tables) + of_lanes)
     writer = _Writer(HEAD + sum(count * words for count, words in zip(counts, (MOVE, STAGE, FILL, RELOCATION), strict=True)))
+    groups = (many.stages, many.closing, many.beginning)
+    times = [time for time, group in zip(TIMES, groups, strict=True) for _ in group]
     moved, staged, fills = [], [], []
     for k, (array, row) in enumerate(moves):
         writer.refer(HEAD + MOVE * k, IN_DATA, regions[key_of(array)].first)
         moved.append((0, len(array), row, int(array.flags.writeable)))
     for k, stage in enumerate(many.every):
         memory = space if stage.memory is None else memories[id(stage.memory)]
-        number, closes = functions.index(function_name(stage)), int(k >= len(many.stages))
-        staged.append((number, closes, int(stage.sees_world), memory, 0, 0))
+        staged.append((functions.index(function_name(stage)), times[k], int(stage.sees_world), memory, 0, 0))
         constants = HEAD + MOVE * len(moves) + STAGE * k + 4
         writer.refer(constants, IN_PROGRAM, writer.put(stage.constants))
         writer.refer(constants + 1, IN_PROGRAM, writer.tables(stage, regions))
@@ -219,4 +221,5 @@ def program_of(many: Pieces, other: Pieces, functions: Sequence[str], taped: Tap
     rows = sum(region.rows for region in regions.values())
     head = np.array([MAGIC, writer.size, 0, 0, rows, space, 0, *counts, way_back], dtype=np.int64)
     lists = [np.ravel(np.array(one, dtype=np.int64)) for one in (moved, staged, fills, writer.relocations)]
-    return Program(np.concatenate([head, *lists, *writer.pieces]), tuple(found), rows, Threads(space, adjoints, back), about)
+    threads = Threads(space, adjoints, back, bool(many.beginning))
+    return Program(np.concatenate([head, *lists, *writer.pieces]), tuple(found), rows, threads, about)

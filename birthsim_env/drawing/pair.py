@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.lettering import Lettering
 from birthsim_env.drawing.magnifier import Magnifier
-from birthsim_env.drawing.panel import pressure_colour
 from birthsim_env.drawing.pen import FINE, Box, Pen, Point, number
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.drawing.view import View
@@ -24,7 +23,7 @@ class Half:
     """One of the two, in ``box`` px: ``name`` of what runs, and axes for its error over ``span`` s up to ``top`` m."""
 
     def __init__(self, parameters: Parameters, box: Box, name: str, span: tuple[float, float], top: float, unit: float) -> None:
-        self.box, self._air, self._name, self._span, self._top, self._unit = box, parameters.air, name, span, top, unit
+        self.box, self._name, self._span, self._top, self._unit = box, name, span, top, unit
         self._margin = margin = round(8 * unit)
         self._text, self._small = Lettering(round(14 * unit)), Lettering(round(13 * unit))
         self._heading = Lettering(round(15 * unit), bold=True)
@@ -67,7 +66,7 @@ class Half:
     def draw(self, picture: pygame.Surface, scene: Scene, times: NDArray[np.float64], errors: NDArray[np.float64]) -> None:
         """Draw one instant, and the error (m) at all ``times`` (s) so far."""
         end_effector = self._view.end_effector(scene)
-        self._view.draw(picture, scene, lambda pressure: pressure_colour(pressure, self._air), WINDOW)
+        self._view.draw(picture, scene, WINDOW)
         self._magnifier.draw(picture, scene, end_effector, WINDOW, self._view.scale)
         error = f"error {number(1e3 * errors[-1], '.1f')} mm"
         at = self.box.right - 2 * self._margin, self.box.y + self._margin
@@ -98,7 +97,7 @@ class Pair:
     """Picture ``width`` px wide of two runs, ``names`` above them; ``title`` over both, the scales as in ``Half``."""
 
     def __init__(
-        self, parameters: Parameters, title: str, names: Sequence[str], span: tuple[float, float], top: float, width: int
+        self, parameters: Parameters, title: str, names: Sequence[str], span: tuple[float, float], top: float, width: int = 960
     ) -> None:
         self._unit = unit = width / 960
         self.width, self.height = width, round(0.66 * width / 2) * 2
@@ -150,11 +149,14 @@ class Pair:
             x += 2 * size + self._text.width(word) + 5 * self._margin
         return words
 
-    def draw(self, scenes: Sequence[Scene], times: NDArray[np.float64], errors: Sequence[NDArray[np.float64]]) -> None:
-        """Draw both scenes, with the errors (m) at the ``times`` (s) so far, on ``surface``."""
+    def frame(
+        self, scenes: Sequence[Scene], times: NDArray[np.float64], errors: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.uint8]:
+        """Draw both scenes, with the errors (m) at the ``times`` (s) so far, as (height, width, 3) RGB."""
         picture, margin = self.surface, self._margin
         picture.blit(self._background, (0, 0))
         for half, scene, error in zip(self._halves, scenes, errors, strict=True):
             half.draw(picture, scene, times, error)
         pull = f"pull {number(math.hypot(*scenes[0].user_force), '.0f')} N    t = {number(scenes[0].time, '.1f')} s"
         self._heading.write(picture, pull, (self.width - 2 * margin, margin), d.INK, (1, 0))
+        return d.pixels(picture)

@@ -8,19 +8,8 @@ import pygame
 from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.lettering import Lettering
 from birthsim_env.drawing.magnifier import Magnifier
-from birthsim_env.drawing.pen import FINE, Box, Colour, Pen, number
+from birthsim_env.drawing.pen import FINE, Box, Pen, number
 from birthsim_env.physics.rig.parameters import Air
-
-
-def _fraction(pressure: float, air: Air) -> float:
-    """0 at atmospheric pressure, 1 at supply pressure."""
-    low, high = air.atmospheric_pressure, air.supply_pressure
-    return float(pressure - low) / (high - low)
-
-
-def pressure_colour(pressure: float, air: Air) -> Colour:
-    """Colour of air at an absolute pressure, Pa."""
-    return d.mix(d.LOW_PRESSURE, d.HIGH_PRESSURE, _fraction(pressure, air))
 
 
 class Panel:
@@ -44,10 +33,6 @@ class Panel:
         label, value = text.width("P1") + margin, text.width("0.00") + margin // 2
         self._track = Box(box.x + margin + label, bottom + row, box.width - 2 * margin - label - value, row)
         self._bar = Box(self._track.x, self._track.y + (4 * row if self._gauges else 0), self._track.width, round(0.6 * row))
-
-    def colour(self, pressure: float) -> Colour:
-        """Colour of air at an absolute pressure, Pa."""
-        return pressure_colour(pressure, self._air)
 
     def draw_static(self, page: Pen) -> None:
         """Legend markers and colour bar on the fine background; ``page`` counts px from the top left corner, y up."""
@@ -90,12 +75,12 @@ class Panel:
             return
         track, row = self._track, self._row
         for i, (name, pressure) in enumerate(zip(("P1", "N1", "P2", "N2"), pressures, strict=True)):
-            top, fraction = track.y + i * row, _fraction(pressure, self._air)
+            top, fraction = track.y + i * row, d.pressure_fraction(pressure, self._air)
             picture.fill(d.FAINT, (track.x, top + 2, track.width, row - 5))
             if math.isfinite(fraction):
                 length = round(min(max(fraction, 0.0), 1.0) * track.width)
                 picture.fill(d.CAP, (track.x, top + 2, min(length + 1, track.width), row - 5))
-                picture.fill(self.colour(pressure), (track.x, top + 3, length, row - 7))
+                picture.fill(d.pressure_colour(pressure, self._air), (track.x, top + 3, length, row - 7))
             self._text.write(picture, name, (self.box.x + self._margin, top + row / 2), d.INK, (0, 0.5))
             value = number(pressure / 1e5, ".1f") if not pressure > 99e5 else "> 99"
             self._text.write(picture, value, (self.box.right - self._margin, top + row / 2), d.INK, (1, 0.5))

@@ -8,6 +8,8 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from birthsim_env.physics.rig.parameters import Air
+
 Point = tuple[float, float]
 Colour = tuple[int, int, int]
 
@@ -39,11 +41,19 @@ def mix(low: Colour, high: Colour, fraction: float) -> Colour:
     if math.isnan(fraction):
         return STEEL
     fraction = min(max(fraction, 0.0), 1.0)
-    return (
-        round(low[0] + fraction * (high[0] - low[0])),
-        round(low[1] + fraction * (high[1] - low[1])),
-        round(low[2] + fraction * (high[2] - low[2])),
-    )
+    red, green, blue = (round(a + fraction * (b - a)) for a, b in zip(low, high, strict=True))
+    return red, green, blue
+
+
+def pressure_fraction(pressure: float, air: Air) -> float:
+    """0 at atmospheric pressure, 1 at supply pressure."""
+    low, high = air.atmospheric_pressure, air.supply_pressure
+    return float(pressure - low) / (high - low)
+
+
+def pressure_colour(pressure: float, air: Air) -> Colour:
+    """Colour of air at an absolute pressure, Pa."""
+    return mix(LOW_PRESSURE, HIGH_PRESSURE, pressure_fraction(pressure, air))
 
 
 def number(value: float, form: str) -> str:
@@ -106,6 +116,15 @@ def paste(fine: pygame.Surface, picture: pygame.Surface, box: Box, part: pygame.
         size = right - left, bottom - top
         source = fine.subsurface((left * FINE, top * FINE, size[0] * FINE, size[1] * FINE))
         pygame.transform.smoothscale(source, size, picture.subsurface((box.x + left, box.y + top, *size)))
+
+
+def pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
+    """A fresh copy of a picture (height, width, 3), RGB."""
+    width, height = surface.get_size()
+    copied = np.empty((height, width, 3), dtype=np.uint8)
+    # SDL converts into the array itself, five times as fast as by way of bytes.
+    pygame.image.frombuffer(copied.data, (width, height), "RGB").blit(surface, (0, 0))
+    return copied
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 import math
 
+import numpy as np
 import pygame
+from numpy.typing import NDArray
 
 from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.lettering import Lettering
@@ -33,7 +35,7 @@ class Picture:
         self._background = pygame.Surface((width, height), 0, 32)
         self._draw_background()
 
-    def pixel(self, point: Point) -> Point:
+    def to_pixel(self, point: Point) -> Point:
         """Pixel (column, row) of a world point, m, in the main view; whole numbers are pixel edges."""
         return self._view.pixel(point)
 
@@ -68,12 +70,17 @@ class Picture:
         d.paste(fine, self._background, Box(0, 0, self.width, self.height))
         self._panel.write_static(self._background)
 
+    def frame(self, scene: Scene) -> NDArray[np.uint8]:
+        """Draw the picture of ``scene`` as (height, width, 3) RGB; a fresh array each time."""
+        self.draw(scene)
+        return d.pixels(self.surface)
+
     def draw(self, scene: Scene) -> None:
         """Draw ``scene`` on ``surface``."""
         picture, magnifier, end_effector = self.surface, self._panel.magnifier, self._view.end_effector(scene)
         window = magnifier.window(scene.compliant_target, (scene.target, end_effector))
         picture.blit(self._background, (0, 0))
-        self._view.draw(picture, scene, self._panel.colour, window)
+        self._view.draw(picture, scene, window)
         magnifier.draw(picture, scene, end_effector, window, self._view.scale)
         self._panel.draw_pressures(picture, scene.pressures)
         self._write_header(scene, end_effector)

@@ -52,18 +52,10 @@ class Barrel:
 
 def _smooth(corners: Sequence[Point], steps: int) -> list[Point]:
     """Lay a closed Catmull-Rom curve through the corners."""
-    n, curve = len(corners), []
-    for i in range(n):
-        p = [corners[(i + k) % n] for k in (-1, 0, 1, 2)]
-        for t in (j / steps for j in range(steps)):
-            weights = (-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3, t + 4 * t**2 - 3 * t**3, t**3 - t**2)
-            curve.append(
-                (
-                    sum(w * q[0] for w, q in zip(weights, p, strict=True)) / 2,
-                    sum(w * q[1] for w, q in zip(weights, p, strict=True)) / 2,
-                )
-            )
-    return curve
+    t = np.arange(steps) / steps
+    weights = np.array([-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3, t + 4 * t**2 - 3 * t**3, t**3 - t**2]) / 2
+    around = np.array([np.roll(corners, -k, axis=0) for k in (-1, 0, 1, 2)])
+    return [(x, y) for x, y in np.einsum("kt,kid->itd", weights, around).reshape(-1, 2).tolist()]
 
 
 # Profile in units of the skull's radius: first towards the crown, second towards the face.

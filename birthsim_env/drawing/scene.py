@@ -1,9 +1,24 @@
 """What a picture of the rig shows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from birthsim_env.physics.rig.values import shown
+
+LEAST, LARGEST = (320, 240), (7680, 4320)
+"""px: sizes of a picture."""
+
+
+def checked_size(name: str, size: Sequence[int]) -> tuple[int, int]:
+    """``size`` (width, height) in px, or a ``ValueError`` that names it, its value and what is allowed."""
+    given = np.asarray(size if isinstance(size, (tuple, list, np.ndarray)) and len(size) == 2 else None)
+    if given.shape != (2,) or given.dtype.kind not in "iu" or np.any(given < LEAST) or np.any(given > LARGEST):
+        (w, h), (wide, high) = LEAST, LARGEST
+        raise ValueError(f"{name} = {shown(size)}; allowed: two whole numbers from {w} x {h} to {wide} x {high} px")
+    return int(given[0]), int(given[1])
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,12 @@
 """The rig in its workspace with everything that happens at the end effector: the main view of a picture."""
 
 import math
-from collections.abc import Callable
 
 import pygame
 
 from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.lettering import Lettering
-from birthsim_env.drawing.pen import FINE, Axis, Box, Colour, Pen, Point
+from birthsim_env.drawing.pen import FINE, Axis, Box, Pen, Point
 from birthsim_env.drawing.rig import Pose, Rig
 from birthsim_env.drawing.scene import Scene, path_of
 from birthsim_env.physics.rig.parameters import Parameters
@@ -26,7 +25,7 @@ class View:
     ) -> None:
         self.box, self._text, self._small, self._unit, self._margin = box, text, small, unit, margin
         self._field = Box(box.x, box.y, box.width, box.height - strip)
-        self._rig = Rig(parameters)
+        self._rig, self._air = Rig(parameters), parameters.air
         self.scale, self.origin = self._fit()
         self._sheet = d.sheet(box)
         self._world = Pen(self._sheet, (self.origin[0] - box.x, self.origin[1] - box.y), self.scale)
@@ -58,8 +57,8 @@ class View:
         pose = self._rig.pose(scene.piston)
         return pose.end_effector if pose is not None else (math.nan, math.nan)
 
-    def draw(self, picture: pygame.Surface, scene: Scene, colour: Callable[[float], Colour], window: float) -> None:
-        """Draw ``scene`` over the background; ``colour`` of a pressure (Pa), ``window`` of the magnifier (m)."""
+    def draw(self, picture: pygame.Surface, scene: Scene, window: float) -> None:
+        """Draw ``scene`` over the background; ``window`` of the magnifier (m)."""
         pen, unit, path = self._world, self._unit, path_of(scene)
         pose = self._rig.pose(scene.piston)
         # Only what the last picture covered needs cleaning, and only what this one covers is scaled down.
@@ -67,7 +66,7 @@ class View:
         pen.touched = pygame.Rect(0, 0, 0, 0)
         pen.curve(path, d.PATH, 2.0 * unit)
         if pose is not None:
-            self._rig.draw(pen, pose, [colour(pressure) for pressure in scene.pressures])
+            self._rig.draw(pen, pose, [d.pressure_colour(pressure, self._air) for pressure in scene.pressures])
         # Once more, thin: the path goes on across head and rod.
         pen.curve(path, d.PATH, 0.8 * unit)
         square = Axis(scene.compliant_target, (1.0, 0.0)).box(-window / 2, window / 2, window / 2)

@@ -13,11 +13,12 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.rows import SEEN, WORLD
+from birthsim_env.loop.rows import SEEN, TIME, WORLD
 from birthsim_env.loop.stage import Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.dynamics import load, store
 
 WORTH_A_THREAD = 300
 """Lanes times periods that are worth another thread, which takes about 0.1 ms to set to work; a lane and period takes 0.4 to
@@ -32,10 +33,7 @@ def load_rows(moves: NDArray[np.int64], lanes: int, start: int, n: int, space: A
     """Copies ``n`` lanes from ``start`` on, of arrays that ``_run`` describes, into a block (rows, BLOCK)."""
     for m in range(moves.shape[0]):
         count, row = moves[m, 1], moves[m, 2]
-        array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
-        for k in range(count):
-            for i in range(n):
-                space[row + k, i] = array[k, start + i]
+        load(carray(pointer(moves[m, 0], np.float64), (count, lanes)), start, n, space[row:])
 
 
 @helper
@@ -43,11 +41,8 @@ def store_rows(moves: NDArray[np.int64], lanes: int, start: int, n: int, space: 
     """Copies the block back into those arrays that are written."""
     for m in range(moves.shape[0]):
         count, row = moves[m, 1], moves[m, 2]
-        array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
         if moves[m, 3]:
-            for k in range(count):
-                for i in range(n):
-                    array[k, start + i] = space[row + k, i]
+            store(space[row:], start, n, carray(pointer(moves[m, 0], np.float64), (count, lanes)))
 
 
 @helper
@@ -150,6 +145,13 @@ class Loop:
 
     def _between(self, periods: int, first: int, last: int) -> int:
         return int(_run(self._moves, self._stages, self._rows, self._lanes, periods, first, last))
+
+
+def sampled(stage: Stage, time: Array, first: int, count: int) -> Array:
+    """The rows (``count``, N) of ``Seen`` from ``first`` on that a stage writes at ``time`` (N,), s, of N lanes."""
+    now, rows = np.array(time[None], dtype=np.float64), np.zeros((count, len(time)))
+    Loop(len(time), [], [(now, TIME), (rows, first)], [stage]).run()
+    return rows
 
 
 class MixedLoop:

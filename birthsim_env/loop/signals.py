@@ -90,6 +90,13 @@ class Reference(Motion, Setpoints):
         return np.asarray(self.position + np.stack([x, y]))
 
 
+@helper
+def given_way(reference: Reference, fx: float, fy: float, i: int) -> tuple[float, float]:
+    """What a force, N, displaces the compliant target of lane ``i`` by (19), m."""
+    kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
+    return compliance(fx, fy, kx, ky, kxy)
+
+
 REFERENCE_NAMES = tuple(name for name, *_ in Reference.entries())
 REFERENCES = Reference.size
 

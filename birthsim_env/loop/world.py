@@ -4,9 +4,11 @@ from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage, scratch
 from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import STATES, Array
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
+from birthsim_env.physics.compiled.lanes import INVERSE_SUPPLY, SOURCE, STATES, SUPPLY, V1, V2, Y1, Y2, Array, Rig
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+from birthsim_env.physics.equilibrium import balance
 from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.options import SCRATCH
 
 
@@ -83,6 +85,64 @@ def plant_stage(rigs: Array, memory: Array, period: float) -> Stage:
     if not options.are_off(rigs):
         return Stage(_optional_plant, clock, memory)
     return Stage(_plant, clock) if spools.are_perfect(rigs) else Stage(_worn_plant, clock, memory[: InnerCommands.size])
+
+
+class Start(Rows):
+    """With what an episode begins."""
+
+    seed = row("1", "of the lane, the bits of a whole number")
+    episode = row("1", "number of the episode, likewise")
+    elsewhere = row("1", "1 to begin at a place, at rest, instead of on the target")
+    place = rows("x y", "m", "that place, of the end effector")
+
+
+class Described(Numbers):
+    """The rig as described, by whose geometry the pistons are put."""
+
+    rig = part(Rig, "as described")
+
+
+@helper
+def _settle(world: World, seen: Seen, own: Start, about: Described, n: int) -> None:
+    """Put the pistons on the target, or where they are to start, the chambers in balance."""
+    motion, joints, asked = scratch(4), scratch(4), seen.reference
+    for i in range(n):
+        elsewhere = own.elsewhere[i] > 0.0
+        for axis in range(2):
+            motion[axis, i] = own.place[axis, i] if elsewhere else asked.position[axis, i]
+            motion[2 + axis, i] = 0.0 if elsewhere else asked.velocity[axis, i]
+    piston_motion(motion, about.rig, joints, n)
+    for i in range(n):
+        world.state[Y1, i], world.state[Y2, i] = joints[0, i], joints[1, i]
+        world.state[V1, i], world.state[V2, i] = joints[2, i], joints[3, i]
+    balance(world.state[:, :n], asked.pneumatic_stiffness, world.rig[:, :n])
+    end_effector_motion(world.state[:, :n], world.rig[:, :n], world.motion.rows[:, :n])
+
+
+@kernel
+def _start(world: World, seen: Seen, own: Start, about: Described, tables: int, lane: int, n: int) -> int:
+    _settle(world, seen, own, about, n)
+    return 0
+
+
+@kernel
+def _rest(world: World, seen: Seen, memory: FurtherStates, constants: int, tables: int, lane: int, n: int) -> int:
+    """What the options of ``physics.options`` begin with."""
+    p = world.rig
+    for i in range(n):
+        p[SUPPLY, i], p[INVERSE_SUPPLY, i] = p[SOURCE, i], 1.0 / p[SOURCE, i]
+    options.rest(world.state[:, :n], p[:, :n], memory.further[:, :n])
+    options.port_motion(world.state[:, :n], memory.further[:, :n], p[:, :n], world.motion.rows[:, :n])
+    return 0
+
+
+def start_stages(start: Array, nominal: Array, plant: Stage) -> list[Stage]:
+    """What puts the ``plant`` where episodes begin, once target and setpoints are known, to the bits of ``Simulation.begin``.
+
+    ``start`` (``Start.size``, N) is ``Start``, ``nominal`` (PARAMETERS,) the rig as described.
+    """
+    first = Stage(_start, Described.numbers(rig=nominal), start)
+    return [first, Stage(_rest, memory=plant.memory)] if plant.function is _optional_plant else [first]
 
 
 class Before(Rows):

@@ -6,22 +6,24 @@ An actuation is asked once per policy step where ``every_period`` is False, else
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
-from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import ACTION, OPENING, STATE, Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.dynamics import driving_flows
 from birthsim_env.physics.plant import Plant
 
 VALVE_LAYOUTS = ("two_valves", "one_valve")
+CHAMBERS = ("P1", "N1", "P2", "N2")
 
 
 class Actuation(Protocol):
@@ -80,35 +82,10 @@ def _valve_stage(world: int, seen: Seen, memory: int, layout: Layout, tables: in
     return 0
 
 
-class ValveActuation(Forgetful):
-    """The action is the spool opening: voltage = 5 V + 5 V x action. One entry per valve."""
-
-    every_period = False
-
-    def __init__(self, layout: str) -> None:
-        self._one_valve = layout == "one_valve"
-        chambers = ("cylinder 1", "cylinder 2") if self._one_valve else ("P1", "N1", "P2", "N2")
-        self.names = tuple(f"opening of the valve of {chamber}, 1" for chamber in chambers)
-        self.size = len(self.names)
-        self._openings: Array = np.zeros((4, 0))
-
-    def begin(self, lanes: Mask) -> None:
-        pass
-
-    def accept(self, actions: Array) -> None:
-        self._openings = np.stack([actions[0], -actions[0], actions[1], -actions[1]]) if self._one_valve else actions
-
-    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
-        return self._openings
-
-    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
-        """``openings``, compiled into the closed loop."""
-        return [Stage(_valve_stage, Layout.numbers(one_valve=self._one_valve), sees_world=False)]
-
-
-@helper
-def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openings: Array) -> None:
-    for i in range(state.shape[1]):
+@kernel
+def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: int, lane: int, n: int) -> int:
+    wanted, one_valve, state, p, openings = seen.action, layout.one_valve > 0.0, world.state, world.rig, seen.opening
+    for i in range(n):
         full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * p[at.RHO0, i] * math.sqrt(p[at.COLDNESS, i])
         for cylinder in range(2):
             pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
@@ -128,15 +105,55 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
                 conductance, leak = p[at.CONDUCTANCE, i], p[at.LEAKAGE, i]
                 openings[chamber_p, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, conductance, leak)
                 openings[chamber_n, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, conductance, leak)
-
-
-@kernel
-def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: int, lane: int, n: int) -> int:
-    _flow_openings(seen.action, layout.one_valve > 0.0, world.state[:, :n], world.rig[:, :n], seen.opening)
     return 0
 
 
-class FlowActuation(Forgetful):
+class _ByLayout(Forgetful):
+    """An actuation whose openings a ``kernel`` computes, here and in the closed loop; ``entries`` with a valve per chamber, or
+    per cylinder."""
+
+    kernel: ClassVar[tuple[Callable[..., int], bool]]
+    """And whether it has to see the world."""
+    entries: ClassVar[tuple[tuple[str, ...], tuple[str, ...]]]
+    every_period: bool
+
+    def __init__(self, layout: str) -> None:
+        self._one_valve = layout == "one_valve"
+        self.names = self.entries[self._one_valve]
+        self.size = len(self.names)
+        self._action: Array = np.zeros((self.size, 0))
+
+    def begin(self, lanes: Mask) -> None:
+        pass
+
+    def accept(self, actions: Array) -> None:
+        self._action = np.array(actions, dtype=np.float64, order="C")
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        openings, world = np.zeros((4, plant.num_envs)), [(plant.lane_parameters, 0), (plant.state, STATE)]
+        Loop(plant.num_envs, world, [(self._action, ACTION), (openings, OPENING)], [self._stage()]).run()
+        return openings
+
+    def _stage(self) -> Stage:
+        function, sees_world = self.kernel
+        return Stage(function, Layout.numbers(one_valve=self._one_valve), sees_world=sees_world)
+
+    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
+        """``openings``, compiled into the closed loop."""
+        return [self._stage()]
+
+
+class ValveActuation(_ByLayout):
+    """The action is the spool opening: voltage = 5 V + 5 V x action. One entry per valve."""
+
+    kernel, every_period = (_valve_stage, False), False
+    entries = (
+        tuple(f"opening of the valve of {chamber}, 1" for chamber in CHAMBERS),
+        ("opening of the valve of cylinder 1, 1", "opening of the valve of cylinder 2, 1"),
+    )
+
+
+class FlowActuation(_ByLayout):
     """The action is a net mass flow in units of the choked flow C rho0 Ps sqrt(T0/T) (3.2 g/s by default).
 
     The inverse of the valve characteristic, at the true pressures and with the rig that was drawn, turns it into openings at
@@ -144,33 +161,11 @@ class FlowActuation(Forgetful):
     ``two_valves`` there is a flow per chamber (into it is positive), with ``one_valve`` the active flow qA (8) per cylinder.
     """
 
-    every_period = True
-
-    def __init__(self, layout: str) -> None:
-        self._one_valve = layout == "one_valve"
-        unit = "unit of the choked flow"
-        self.names = (
-            (f"active flow qA of cylinder 1, {unit}", f"active flow qA of cylinder 2, {unit}")
-            if self._one_valve
-            else tuple(f"flow into chamber {chamber}, {unit}" for chamber in ("P1", "N1", "P2", "N2"))
-        )
-        self.size = len(self.names)
-        self._wanted: Array = np.zeros((self.size, 0))
-
-    def begin(self, lanes: Mask) -> None:
-        pass
-
-    def accept(self, actions: Array) -> None:
-        self._wanted = actions
-
-    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
-        openings = np.empty((4, plant.num_envs))
-        _flow_openings(self._wanted, self._one_valve, plant.state, plant.lane_parameters, openings)
-        return openings
-
-    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
-        """``openings``, compiled into the closed loop."""
-        return [Stage(_flow_stage, Layout.numbers(one_valve=self._one_valve))]
+    kernel, every_period = (_flow_stage, True), True
+    entries = (
+        tuple(f"flow into chamber {chamber}, unit of the choked flow" for chamber in CHAMBERS),
+        ("active flow qA of cylinder 1, unit of the choked flow", "active flow qA of cylinder 2, unit of the choked flow"),
+    )
 
 
 ACTUATIONS: dict[str, Callable[[str], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}

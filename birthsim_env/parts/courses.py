@@ -98,24 +98,16 @@ def check_drawn(trajectory: Trajectory, duration: float, rig: Parameters) -> Non
 
 def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[Array], Array]:
     """What gives the rows (size, K L) of a part at K instants, s; where the part can do that, of these lanes alone."""
+
+    def checked_rows(part: Any, times: Array) -> Array:
+        return checked(f"{name}.sample(time)", part.sample(times), (size, len(times)), "SI")
+
     if not is_vectorised(part.sample):
         return lambda instants: np.concatenate(
-            [_of_all(name, part, size, num_envs, instant).take(lanes, axis=1) for instant in instants], axis=1
+            [checked_rows(part, np.full(num_envs, instant)).take(lanes, axis=1) for instant in instants], axis=1
         )
-
-    @cache
-    def repeated(times: int) -> Any:
-        return part.some(np.tile(lanes, times))
-
-    def sample(instants: Array) -> Array:
-        rows = repeated(len(instants)).sample(np.repeat(instants, len(lanes)))
-        return checked(f"{name}.sample(time)", rows, rows.shape, "SI")
-
-    return sample
-
-
-def _of_all(name: str, part: Any, size: int, num_envs: int, instant: float) -> Array:
-    return checked(f"{name}.sample(time)", part.sample(np.full(num_envs, instant)), (size, num_envs), "SI")
+    repeated = cache(lambda times: part.some(np.tile(lanes, times)))
+    return lambda instants: checked_rows(repeated(len(instants)), np.repeat(instants, len(lanes)))
 
 
 def _check(instants: Array, motion: Array, asked: Array, rig: Parameters) -> None:

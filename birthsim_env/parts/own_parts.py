@@ -19,6 +19,7 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.values import is_finite, problem, shown
 
 COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
@@ -126,23 +127,16 @@ def stepped(times: Array, stiffness: Array) -> StiffnessSchedule:
     return StiffnessSchedule(starts, setpoints, (4200.0,) * len(chosen), (2100.0,) * len(chosen))
 
 
-def _pair(kind: str, call: str, value: Any, expected: str) -> Array:
-    """Two finite numbers that a user's function returned."""
-    try:
-        pair: Array = np.asarray(value, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
-        pair = np.empty(0)
-    if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise ValueError(f"{kind}: {call} = {shown(value)}; allowed: {expected}")
-    return pair
-
-
 def _called(kind: str, call: str, function: Callable[..., Any], arguments: tuple[Any, ...], expected: str) -> Array:
+    """Two finite numbers that a user's function returns."""
     try:
         value = function(*arguments)
     except Exception as error:
         raise ValueError(f"{kind}: {call} fails ({problem(error)}); allowed: {expected}") from error
-    return _pair(kind, call, value, expected)
+    try:
+        return checked(call, np.ravel(value), (2,), "SI")
+    except ValueError as error:
+        raise ValueError(f"{kind}: {call} = {shown(value)}; allowed: {expected}") from error
 
 
 class PlainHand(UserForce):

@@ -6,11 +6,13 @@ start of every episode.
 
 import copy
 import math
+from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
 
-from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.loop import sampled
+from birthsim_env.loop.rows import REFERENCE, Seen
 from birthsim_env.loop.signals import Motion
 from birthsim_env.loop.stage import Stage, table2
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
@@ -54,15 +56,26 @@ class Trajectory:
 
 
 class _Planned(Trajectory):
-    """A trajectory that follows from a few numbers per lane, ``_own`` (rows, N)."""
+    """A trajectory that follows from a few numbers per lane, ``_own`` (rows, N): their layout, and what follows, a kernel."""
 
-    _own: Array
+    planned: tuple[type[Rows], Callable[..., int]]
+
+    def prepare(self, num_envs: int) -> None:
+        self._own: Array = np.zeros((self.planned[0].size, num_envs))
 
     def some(self, lanes: Any) -> Self:
         """The same for lanes (L,) alone."""
         few = copy.copy(self)
         few._own = self._own.take(lanes, axis=1)
         return few
+
+    @vectorised
+    def sample(self, time: Array) -> Array:
+        return sampled(self.stage(), time, REFERENCE, Motion.size)
+
+    def stage(self) -> Stage:
+        """``sample``, compiled into the closed loop."""
+        return Stage(self.planned[1], tables=(self._own,))
 
 
 class Round(Rows):
@@ -73,8 +86,9 @@ class Round(Rows):
     rate = row("rad/s", "angular speed")
 
 
-@helper
-def _circle(time: Array, own: Round, target: Motion, n: int) -> None:
+@kernel
+def _circle(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    own, time, target = Round(table2(tables, 0)[:, lane : lane + n]), seen.time, seen.reference
     for i in range(n):
         w = own.rate[i]
         cosine, sine = own.radius[i] * exact.cosine(w * time[i]), own.radius[i] * exact.sine(w * time[i])
@@ -82,16 +96,13 @@ def _circle(time: Array, own: Round, target: Motion, n: int) -> None:
         target.velocity[0, i], target.velocity[1, i] = -w * sine, w * cosine
         target.acceleration[0, i], target.acceleration[1, i] = -w * w * cosine, -w * w * sine
         target.jerk[0, i], target.jerk[1, i] = w * w * w * sine, -w * w * w * cosine
-
-
-@kernel
-def _circle_stage(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    _circle(seen.time, Round(table2(tables, 0)[:, lane : lane + n]), seen.reference, n)
     return 0
 
 
 class Circle(_Planned):
     """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
+
+    planned = Round, _circle
 
     def __init__(self, centre: tuple[float, float] = (0.5, 0.0), radius: Range = 0.05, period: Range = 4.0) -> None:
         if not (isinstance(centre, tuple) and len(centre) == 2):
@@ -104,22 +115,9 @@ class Circle(_Planned):
             raise ValueError(f"period = {shown(period)}; allowed: other than zero, {SHORTEST:g} s or more either way")
         self.centre, self.radius, self.period = centre, radius, period
 
-    def prepare(self, num_envs: int) -> None:
-        self._own = np.zeros((Round.size, num_envs))
-
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         put(self._own, lane, (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng)))
-
-    @vectorised
-    def sample(self, time: Array) -> Array:
-        target = Motion(np.empty((Motion.size, time.shape[0])))
-        _circle(time, Round(self._own), target, len(time))
-        return target.rows
-
-    def stage(self) -> Stage:
-        """``sample``, compiled into the closed loop."""
-        return Stage(_circle_stage, tables=(self._own,))
 
 
 @helper
@@ -145,8 +143,9 @@ class Line(Rows):
     ends = row("s", "when it ends")
 
 
-@helper
-def _path(time: Array, own: Line, target: Motion, n: int) -> None:
+@kernel
+def _path(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    own, time, target = Line(table2(tables, 0)[:, lane : lane + n]), seen.time, seen.reference
     for i in range(n):
         heading, straight, radius, angle = own.heading[i], own.straight[i], own.radius[i], own.angle[i]
         lasts = own.ends[i] - own.begins[i]
@@ -172,11 +171,6 @@ def _path(time: Array, own: Line, target: Motion, n: int) -> None:
         target.velocity[0, i], target.velocity[1, i] = tx * ds, ty * ds
         target.acceleration[0, i], target.acceleration[1, i] = tx * dds - ty * normal, ty * dds + tx * normal
         target.jerk[0, i], target.jerk[1, i] = tx * jerk_t - ty * jerk_n, ty * jerk_t + tx * jerk_n
-
-
-@kernel
-def _path_stage(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    _path(seen.time, Line(table2(tables, 0)[:, lane : lane + n]), seen.reference, n)
     return 0
 
 
@@ -186,6 +180,8 @@ class Path(_Planned):
     ``start`` (x, y) in m, ``heading`` in rad from x, ``length`` of the line and ``radius`` of the arc in m, ``angle`` of the
     arc in rad (positive turns left), times in s. Where the line meets the arc the acceleration steps by speed^2 / radius.
     """
+
+    planned = Line, _path
 
     def __init__(
         self,
@@ -211,23 +207,10 @@ class Path(_Planned):
         self.start, self.heading, self.length, self.radius, self.angle = start, heading, length, radius, angle
         self.begins, self.ends = begins, ends
 
-    def prepare(self, num_envs: int) -> None:
-        self._own = np.zeros((Line.size, num_envs))
-
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         numbers = (*self.start, self.heading, self.length, self.radius, self.angle)
         put(self._own, lane, (*(draw(number, rng) for number in numbers), self.begins, self.ends))
-
-    @vectorised
-    def sample(self, time: Array) -> Array:
-        target = Motion(np.empty((Motion.size, time.shape[0])))
-        _path(time, Line(self._own), target, len(time))
-        return target.rows
-
-    def stage(self) -> Stage:
-        """``sample``, compiled into the closed loop."""
-        return Stage(_path_stage, tables=(self._own,))
 
 
 class Hold(Path):

@@ -8,12 +8,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from birthsim_env.loop.rows import Seen
-from birthsim_env.loop.signals import Setpoints
+from birthsim_env.loop.loop import sampled
+from birthsim_env.loop.rows import REFERENCE, Seen
+from birthsim_env.loop.signals import Motion, Setpoints
 from birthsim_env.loop.stage import Stage, numbers, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.rig.values import checked_number, checked_range, shown
@@ -99,16 +100,11 @@ class StiffnessSchedule:
     @vectorised
     def sample(self, time: Array) -> Array:
         """Setpoints (7, N) at ``time`` (N,), s."""
-        asked, schedule = Setpoints(np.empty((Setpoints.size, time.shape[0]))), Schedule(self._constants())
-        _sample(time, schedule, self._values, asked, len(time))
-        return asked.rows
-
-    def _constants(self) -> Array:
-        return Schedule.numbers(transition=self.transition, starts=self._starts)
+        return sampled(self.stage(), time, REFERENCE + Motion.size, Setpoints.size)
 
     def stage(self) -> Stage:
         """``sample``, compiled into the closed loop."""
-        return Stage(_schedule_stage, self._constants(), tables=(self._values,))
+        return Stage(_schedule, Schedule.numbers(transition=self.transition, starts=self._starts), tables=(self._values,))
 
 
 class Phase(Rows):
@@ -126,9 +122,11 @@ class Schedule(Numbers):
     starts = rows(0, "s", "of the phases")
 
 
-@helper
-def _sample(time: Array, schedule: Schedule, values: Array, asked: Setpoints, n: int) -> None:
-    """``values`` (P, 5, N): what is asked for in each ``Phase``."""
+@kernel
+def _schedule(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: ``Schedule``; table (P, 5, N): what is asked for in each ``Phase``."""
+    every, time, asked = table3(tables, 0), seen.time, seen.reference
+    schedule, values = Schedule(numbers(constants, Schedule.size + every.shape[0])), every[:, :, lane : lane + n]
     starts, transition = schedule.starts, schedule.transition
     for i in range(n):
         k = 0
@@ -143,12 +141,4 @@ def _sample(time: Array, schedule: Schedule, values: Array, asked: Setpoints, n:
             now, before = phase.pneumatic[axis, i], last.pneumatic[axis, i]
             asked.pneumatic_stiffness[axis, i] = before + (now - before) * minimum_jerk(u, 0)
             asked.pneumatic_stiffness_rate[axis, i] = (now - before) * minimum_jerk(u, 1) / transition
-
-
-@kernel
-def _schedule_stage(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: ``Schedule``."""
-    values = table3(tables, 0)
-    schedule = Schedule(numbers(constants, Schedule.size + values.shape[0]))
-    _sample(seen.time, schedule, values[:, :, lane : lane + n], seen.reference, n)
     return 0

@@ -12,6 +12,7 @@ from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 INTEGRATION_STEP = 0.25e-3
 """s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
@@ -187,7 +188,7 @@ def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
 @helper
 def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
     """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
-    for row in range(at.STATES):
+    for row in range(total.shape[0]):
         for i in range(n):
             total[row, i] += weight * dx[row, i]
             trial[row, i] = x[row, i] + ahead * dx[row, i]
@@ -195,8 +196,8 @@ def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float
 
 @helper
 def copy(source: Array, target: Array, n: int) -> None:
-    """Copy the states of ``n`` lanes."""
-    for row in range(at.STATES):
+    """Copy as many rows of ``n`` lanes as ``target`` has."""
+    for row in range(target.shape[0]):
         for i in range(n):
             target[row, i] = source[row, i]
 
@@ -227,14 +228,10 @@ def integrate(
     """
     for _ in range(steps):
         copy(x, total, n)
-        right_hand_side(x, u, f, p, dx, n)
-        stage(x, dx, total, trial, n, step / 6.0, step / 2.0)
-        right_hand_side(trial, u, f, p, dx, n)
-        stage(x, dx, total, trial, n, step / 3.0, step / 2.0)
-        right_hand_side(trial, u, f, p, dx, n)
-        stage(x, dx, total, trial, n, step / 3.0, step)
-        right_hand_side(trial, u, f, p, dx, n)
-        stage(x, dx, total, trial, n, step / 6.0, 0.0)
+        copy(x, trial, n)
+        for k in range(STAGES):
+            right_hand_side(trial, u, f, p, dx, n)
+            stage(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
         copy(total, x, n)
         record_impacts(x, p, impacts, n)
 

@@ -17,15 +17,9 @@ REST_SPEED = 1e-9
 def balance(state: Array, stiffness: Array, p: Array) -> None:
     """Fills pressures, temperatures and bristles of a state whose positions and speeds are set."""
     for i in range(state.shape[1]):
+        y1, y2 = state[at.Y1, i], state[at.Y2, i]
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            state[at.Y1, i],
-            state[at.Y2, i],
-            p[at.K1, i],
-            p[at.K2, i],
-            p[at.D_SQUARES, i],
-            p[at.D_PRODUCT, i],
-            p[at.SIN_GAMMA3, i],
-            p[at.COS_GAMMA3, i],
+            y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
         )
         weight1 = p[at.MASS, i] * kappa * p[at.GRAVITY, i] * sine
         weight2 = p[at.MASS, i] * p[at.GRAVITY, i] * cosine
@@ -34,7 +28,7 @@ def balance(state: Array, stiffness: Array, p: Array) -> None:
             fc, fs, fv = (at.FC1, at.FS1, at.FV1) if cylinder == 0 else (at.FC2, at.FS2, at.FV2)
             ap, an = (p[at.AREA_P1, i], p[at.AREA_N1, i]) if cylinder == 0 else (p[at.AREA_P2, i], p[at.AREA_N2, i])
             half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
-            y = state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]
+            y = y1 if cylinder == 0 else y2
             speed = state[v, i] if abs(state[v, i]) > REST_SPEED else 0.0
             level = friction.stribeck_level(speed, p[fc, i], p[fs, i], p[at.STRIBECK, i])
             has_bristle = p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5

@@ -11,19 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import (
-    COS_GAMMA3,
-    D_PRODUCT,
-    D_SQUARES,
-    K1,
-    K2,
-    SIN_GAMMA3,
-    V1,
-    V2,
-    Y1,
-    Y2,
-    Array,
-)
+from birthsim_env.physics.compiled.lanes import COS_GAMMA3, D_PRODUCT, D_SQUARES, K1, K2, SIN_GAMMA3, V1, V2, Y1, Y2, Array
 from birthsim_env.physics.rig.parameters import Parameters
 
 

@@ -19,6 +19,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 RESERVOIR, HANDLE, FLOWS = 0, 1, 5
 """Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; flows of chambers P1, N1, P2, N2, kg/s, four
@@ -101,15 +102,6 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
 
 
 @helper
-def add(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
-    """``dynamics.stage`` of all rows."""
-    for row in range(ALL):
-        for i in range(n):
-            total[row, i] += weight * dx[row, i]
-            trial[row, i] = x[row, i] + ahead * dx[row, i]
-
-
-@helper
 def integrate(
     state: Array, further: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, scratch: Array, n: int
 ) -> None:
@@ -120,32 +112,19 @@ def integrate(
     x, dx, total, trial = scratch[:ALL], scratch[ALL : 2 * ALL], scratch[2 * ALL : 3 * ALL], scratch[3 * ALL : 4 * ALL]
     motion, pull, own = scratch[4 * ALL : 4 * ALL + 4], scratch[4 * ALL + 4 : 4 * ALL + 6], scratch[4 * ALL + 6 :]
     alter(p, own, n)
-    for row in range(ALL):
-        for i in range(n):
-            x[row, i] = state[row, i] if row < at.STATES else further[row - at.STATES, i]
+    dynamics.copy(state, x[: at.STATES], n)
+    dynamics.copy(further, x[at.STATES :], n)
     for _ in range(steps):
-        for row in range(ALL):
-            for i in range(n):
-                total[row, i] = x[row, i]
-        right_hand_side(x, u, f, own, motion, pull, dx, n)
-        add(x, dx, total, trial, n, step / 6.0, step / 2.0)
-        right_hand_side(trial, u, f, own, motion, pull, dx, n)
-        add(x, dx, total, trial, n, step / 3.0, step / 2.0)
-        right_hand_side(trial, u, f, own, motion, pull, dx, n)
-        add(x, dx, total, trial, n, step / 3.0, step)
-        right_hand_side(trial, u, f, own, motion, pull, dx, n)
-        add(x, dx, total, trial, n, step / 6.0, 0.0)
-        for row in range(ALL):
-            for i in range(n):
-                x[row, i] = total[row, i]
+        dynamics.copy(x, total, n)
+        dynamics.copy(x, trial, n)
+        for k in range(STAGES):
+            right_hand_side(trial, u, f, own, motion, pull, dx, n)
+            dynamics.stage(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
+        dynamics.copy(total, x, n)
         dynamics.record_impacts(x, p, impacts, n)
     dynamics.settle(x, n)
-    for row in range(ALL):
-        for i in range(n):
-            if row < at.STATES:
-                state[row, i] = x[row, i]
-            else:
-                further[row - at.STATES, i] = x[row, i]
+    dynamics.copy(x[: at.STATES], state, n)
+    dynamics.copy(x[at.STATES :], further, n)
     for i in range(n):
         if p[at.LINE, i] > 0.0:
             p[at.SUPPLY, i], p[at.INVERSE_SUPPLY, i] = further[RESERVOIR, i], 1.0 / further[RESERVOIR, i]

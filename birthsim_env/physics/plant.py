@@ -71,11 +71,6 @@ class Plant:
             self.memory[4:, lanes] = further
 
     @property
-    def inner_commands(self) -> Array:
-        """Where the play of valves with hysteresis is, (4, num_envs)."""
-        return self.memory[:4]
-
-    @property
     def state(self) -> Array:
         """The state, (18, num_envs), with the rows of ``STATE_NAMES``, SI units.
 
@@ -93,8 +88,9 @@ class Plant:
         The openings are those that spools go to: deadband, hysteresis and limit of the valves are ``advance``'s, and so are
         tubes and the handle (``physics.options``).
         """
-        rates = np.empty((STATES, self.num_envs))
-        dynamics.derivatives(*self._arguments(state, opening_command, user_force), self.lane_parameters, rates)
+        x, force = checked("state", state, self.state.shape, "SI"), checked("user_force", user_force, (2, self.num_envs), "N")
+        rates = np.empty_like(x)
+        dynamics.derivatives(x, self._openings(opening_command), force, self.lane_parameters, rates)
         return rates
 
     def advance(self, opening_command: ArrayLike, user_force: ArrayLike, duration: float) -> Array:
@@ -117,7 +113,7 @@ class Plant:
         """``advance`` for arrays known to be right: command (4, num_envs), forces (K, 2, num_envs), contiguous float64."""
         if not spools.are_perfect(self.lane_parameters):
             opening = np.empty_like(command)
-            spools.admit_lanes(command, self.lane_parameters, self.inner_commands, opening)
+            spools.admit_lanes(command, self.lane_parameters, self.memory[:4], opening)
             command = opening
         held = duration / forces.shape[0]
         steps = dynamics.steps_in(held)
@@ -180,10 +176,3 @@ class Plant:
             samples = ()
         several = samples if len(samples) == 1 and samples[0] > 0 else ()
         return checked("user_force", user_force, (*several, 2, self.num_envs), "N").reshape(-1, 2, self.num_envs)
-
-    def _arguments(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> tuple[Array, Array, Array]:
-        return (
-            checked("state", state, (STATES, self.num_envs), "SI"),
-            self._openings(opening_command),
-            checked("user_force", user_force, (2, self.num_envs), "N"),
-        )

@@ -43,9 +43,9 @@ all others."""
 
 RIGS = {
     "nominal": "nominal rig",
-    "randomised": "drawn rig",
-    "drawn-sensors": "figures drawn, nominal rig",
-    "described-sensors": "figures as described, drawn rig",
+    "randomised": "randomised rig",
+    "drawn-sensors": "figures randomised, nominal rig",
+    "described-sensors": "figures as described, randomised rig",
 }
 """Plant -> its words in tables and pictures."""
 

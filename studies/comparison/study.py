@@ -168,7 +168,9 @@ CIRCLES = comparison(
     "circle",
     partial(_table_of, settled, "circle"), lambda where: not where.hand, env=(CIRCLE,), plant=("randomised",),
     sensors=("ideal", "lab"), episodes=100, seed=60000,
-    controller=("backstepping", "pid", "admittance-backstepping", "admittance-adaptive", "residual:circle"),
+    controller=(
+        "backstepping", "pid", "admittance-backstepping", "admittance-adaptive", "residual:circle", "residual:circle_apg",
+    ),
 )  # fmt: skip
 BOUNDED = comparison(
     "bound", wanted=lambda where: not where.hand,

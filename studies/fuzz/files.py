@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 
 from studies.fuzz.harness import Case, Kind
-from studies.fuzz.mutations import NUMBERS, Rng, altered, damaged, json_bytes, toml_bytes
+from studies.fuzz.mutations import Rng, damaged, json_bytes, toml_bytes
 
 STEPS = 12
 
@@ -185,47 +185,10 @@ def _gains(_: Any, rng: Rng, folder: Path, case: Case) -> None:
     assert all(np.isfinite(value) for value in start.values())
 
 
-def _journals(folder: Path) -> bytes:
-    from baselines.commands.tune import open_study
-
-    (folder / "study").mkdir()
-    study = open_study(folder / "study", {"seed": 1})
-    for value in (2.0, 1.0):
-        trial = study.ask()
-        trial.suggest_float("bandwidth", 1.0, 9.0)
-        trial.set_user_attr("parts", {"circle, ideal": value})
-        study.tell(trial, value)
-    return (folder / "study" / "trials.journal").read_bytes()
-
-
-def _journal(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
-    from baselines.commands.tune import listed, open_study
-
-    lines = valid.splitlines(keepends=True)
-    whole = set(lines)
-    for _ in range(int(rng.integers(1, 4))):
-        at = int(rng.integers(len(lines)))
-        match int(rng.integers(5)):
-            case 0:
-                del lines[at]
-            case 1:
-                lines.insert(at, lines[rng.integers(len(lines))])
-            case 2:
-                lines[at] = damaged(rng, lines[at])
-            case _:
-                tree = altered(rng, json.loads(lines[at])) if lines[at] in whole else NUMBERS[0]
-                lines[at] = json.dumps(tree, default=str).encode() + b"\n"
-        lines = lines or [b"\n"]
-    (folder / "study").mkdir()
-    written(case, folder / "study" / "trials.journal", b"".join(lines))
-    listed(open_study(folder / "study", {"seed": 1}))
-
-
 FILES: dict[str, Kind] = {
     "rig": Kind(_rig_files, _rig),
     "configuration": Kind(_configurations, _configuration),
     "recording": Kind(_recordings, _recording),
     "task": Kind(_tasks, _task),
     "gains": Kind(loaded, _gains),
-    "journal": Kind(_journals, _journal),
 }

@@ -19,7 +19,7 @@ from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.success import SETTLED
+from birthsim_env.reward import SETTLED
 
 STATIC = ("force_gain_error", "force_crosstalk", "position_distortion", "distortion_length", "position_scale_error")
 """Errors that do not change in an episode and that no law can find."""

@@ -61,7 +61,7 @@ TARGETS = {
         Target(
             "tune", "birthsim tune",
             ("--controller", "pid", "--lanes", "2", "--sensors", "ideal", "--trials", "3", "--out", "{out}"),
-            differ=("trials.journal",), alone=True, partway=True,
+            alone=True, partway=True,
         ),
         Target(
             "train", "birthsim train",

@@ -169,8 +169,7 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
     # pyplot takes half a second to load.
     from agents.reports.learning_curves import draw_learning_curves, learning_curves
 
-    draw_learning_curves(learning_curves(policy_folders("circle")), folder)
-    return [folder / "learning_curves.png"]
+    return draw_learning_curves(learning_curves(policy_folders("circle")), folder)
 
 
 def _side_by_side(content: Content, folder: Path) -> list[Path]:
@@ -178,8 +177,7 @@ def _side_by_side(content: Content, folder: Path) -> list[Path]:
 
     from_scratch = {"gradients": "circle_apg", "PPO": "circle_pure"}
     curves = {algorithm: learning_curves(policy_folders(name)) for algorithm, name in from_scratch.items()}
-    draw_side_by_side(curves, folder, "from_scratch")
-    return [folder / "from_scratch.png"]
+    return draw_side_by_side(curves, folder, "from_scratch")
 
 
 SOURCES = ("agents.policy.controller", "agents.commands.evaluate", "studies.learned.study")

@@ -34,7 +34,7 @@ open to 0.7 and a hand of 80 N jerks. The error is the largest at any of 50 mark
 A tracker's noise is 100 um. On some random rigs steps of 0.5 ms are unstable or wrong by millimetres, so 0.25 ms is not too
 small. At kinks, where friction reverses or a valve shuts, no method keeps its order. {itself}
 
-![Error against step and cost](accuracy.png)
+![Error against step and cost](accuracy.svg)
 """
 
 BALANCES = """## Balances

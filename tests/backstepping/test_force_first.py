@@ -1,13 +1,15 @@
 """Openings that put the force before the pneumatic stiffness, against the valves' characteristic and linear programmes."""
 
+import gymnasium
 import numba
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from baselines.registry import make_controller
 from baselines.valve_inverse import CylinderAir, force_first_openings, two_valve_openings
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.rig.parameters import Cylinder, Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law
 
 RIG = Parameters()
@@ -24,10 +26,10 @@ def openings_of_both(cases: Array, ap: float, an: float, stroke: float, p: Array
         u[2, i], u[3, i] = two_valve_openings(rate, stiffness_rate, air, p)
 
 
-def openings(cases: Array) -> tuple[Array, Array]:
+def openings(cases: Array, rig: Parameters = RIG) -> tuple[Array, Array]:
     """Force first and neither first, (2, N) each, of cylinder 2."""
     u = np.empty((4, cases.shape[1]))
-    openings_of_both(cases, *derived_law.areas(RIG.cylinder2), LENGTH, Rig(parameter_column(RIG)), u)
+    openings_of_both(cases, *derived_law.areas(rig.cylinder2), LENGTH, Rig(parameter_column(rig)), u)
     assert np.abs(u).max() <= 1
     return u[:2], u[2:]
 
@@ -40,11 +42,11 @@ def drawn(count: int, rates: float, seed: int, pressures: tuple[float, float] = 
     return np.array(cases)
 
 
-def got(case: Array, opening: Array) -> Array:
+def got(case: Array, opening: Array, rig: Parameters = RIG) -> Array:
     """dF/dt and dK/dt of (6) with the flows that the openings let through."""
     _, _, pp, pn, y, v = case
-    flows = [derived_law.net_flow(s, pressure, RIG) for s, pressure in zip(opening, (pp, pn), strict=True)]
-    return derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, RIG.cylinder2, RIG)
+    flows = [derived_law.net_flow(s, pressure, rig) for s, pressure in zip(opening, (pp, pn), strict=True)]
+    return derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, rig.cylinder2, rig)
 
 
 def unit_rates(y: float, pp: float, pn: float, v: float) -> tuple[Array, Array]:
@@ -84,21 +86,25 @@ def best(case: Array) -> tuple[float, float]:
     return still[0] + 1e3 * float(force_row @ first), 1e-4 * float(to_qt @ second)
 
 
-def pressurisation(case: Array, opening: Array) -> float:
+def assert_nearest(case: Array, opening: Array) -> None:
     _, _, pp, pn, y, _ = case
     flows = [derived_law.net_flow(s, pressure, RIG) for s, pressure in zip(opening, (pp, pn), strict=True)]
-    return 0.5 * LENGTH * (flows[0] / (LENGTH / 2 + y) + flows[1] / (LENGTH / 2 - y))
+    pressurisation = 0.5 * LENGTH * (flows[0] / (LENGTH / 2 + y) + flows[1] / (LENGTH / 2 - y))
+    rate, flow = best(case)
+    assert got(case, opening)[0] == pytest.approx(rate, rel=1e-7, abs=1e-3)
+    assert pressurisation == pytest.approx(flow, rel=1e-6, abs=1e-11)
 
 
-def test_without_saturation_both_rates_are_had() -> None:
+@pytest.mark.parametrize("changes", [{}, {"cylinder2.piston_diameter": 0.032, "cylinder2.rod_diameter": 0.012}])
+def test_without_saturation_both_rates_are_had(changes: dict[str, float]) -> None:
     """The same openings as without an order of precedence, and exactly the wanted rates."""
-    cases = drawn(500, 1000.0, seed=0)
-    first, neither = openings(cases)
+    cases, rig = drawn(500, 1000.0, seed=0), RIG.replace(changes)
+    first, neither = openings(cases, rig)
     inside = np.abs(neither).max(axis=0) < 1
-    assert inside.sum() > 200
+    assert inside.sum() > 150
     np.testing.assert_allclose(first[:, inside], neither[:, inside], rtol=0, atol=1e-12)
     for case, opening in zip(cases.T[inside], first.T[inside], strict=True):
-        np.testing.assert_allclose(got(case, opening), case[:2], rtol=1e-9, atol=1e-6)
+        np.testing.assert_allclose(got(case, opening, rig), case[:2], rtol=1e-9, atol=1e-6)
 
 
 @pytest.mark.parametrize("rates", [2e3, 8e3])
@@ -109,12 +115,8 @@ def test_where_a_valve_saturates_the_force_has_precedence(rates: float) -> None:
     saturated, kept = np.abs(neither).max(axis=0) >= 1, 0
     assert saturated.sum() > 40
     for case, opening, plain in zip(cases.T[saturated], first.T[saturated], neither.T[saturated], strict=True):
-        (force_rate, _), (nearest_rate, nearest_qt) = got(case, opening), best(case)
-        assert force_rate == pytest.approx(nearest_rate, rel=1e-7, abs=1e-3)
-        assert pressurisation(case, opening) == pytest.approx(nearest_qt, rel=1e-6, abs=1e-11)
-        lost = abs(got(case, plain)[0] - case[0])
-        if abs(force_rate - case[0]) < 1e-3:
-            kept += lost > 10
+        assert_nearest(case, opening)
+        kept += abs(got(case, opening)[0] - case[0]) < 1e-3 and abs(got(case, plain)[0] - case[0]) > 10
     assert kept > 5, "there must be cases in which precedence matters"
 
 
@@ -123,23 +125,23 @@ def test_pressures_beyond_supply_and_atmosphere(pressures: tuple[float, float]) 
     """A piston that is pushed compresses a chamber beyond the supply: a valve that cannot fill it still does what it can."""
     cases = drawn(60, 3e3, seed=2, pressures=pressures)
     cases[3] = drawn(60, 3e3, seed=3)[3]
-    first, _ = openings(cases)
-    for case, opening in zip(cases.T, first.T, strict=True):
-        nearest_rate, nearest_qt = best(case)
-        assert got(case, opening)[0] == pytest.approx(nearest_rate, rel=1e-7, abs=1e-3)
-        assert pressurisation(case, opening) == pytest.approx(nearest_qt, rel=1e-6, abs=1e-11)
+    for case, opening in zip(cases.T, openings(cases)[0].T, strict=True):
+        assert_nearest(case, opening)
 
 
-def test_it_serves_each_cylinder_with_its_own_areas() -> None:
-    """Another bore, another rod: the wanted rates again."""
-    other = Parameters().replace({"cylinder2.piston_diameter": 0.032, "cylinder2.rod_diameter": 0.012})
-    cylinder: Cylinder = other.cylinder2
-    cases, u = drawn(50, 800.0, seed=4), np.empty((4, 50))
-    openings_of_both(cases, cylinder.area_p, cylinder.area_n, cylinder.stroke, Rig(parameter_column(other)), u)
-    inside = np.abs(u).max(axis=0) < 1
-    assert inside.sum() > 20
-    for case, opening in zip(cases.T[inside], u[:2].T[inside], strict=True):
-        _, _, pp, pn, y, v = case
-        flows = [derived_law.net_flow(s, pressure, other) for s, pressure in zip(opening, (pp, pn), strict=True)]
-        rates = derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, cylinder, other)
-        np.testing.assert_allclose(rates, case[:2], rtol=1e-9, atol=1e-6)
+def survived(name: str, world: int) -> float:
+    """Seconds until the end effector is lost on a varied circle."""
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=1, randomize=True, policy_period=1e-3)
+    controller = make_controller(name, RIG)
+    env.reset(seed=[world])
+    for tick in range(12_000):
+        _, _, terminated, _, _ = env.step(controller.command(env.measurement, env.reference).T)
+        if terminated[0]:
+            return tick * 1e-3
+    return np.inf
+
+
+def test_a_push_that_empties_both_chambers_under_the_papers_law_is_held() -> None:
+    """4 kg where 3 are believed, a hand pulls with 35 N at 1102 N/m: found among random circles."""
+    assert 9.0 < survived("backstepping", 120061) < 10.5
+    assert survived("backstepping-force-first", 120061) == np.inf

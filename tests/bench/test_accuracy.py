@@ -6,34 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.accuracy import errors as accuracy
 from studies.accuracy import tables as accuracy_tables
 from studies.accuracy.figure import accuracy_figure
-from studies.accuracy.motions import MOTIONS, smooth, stick_slip, strong
-
-
-def test_the_rigs_are_of_the_documented_ranges() -> None:
-    rigs, ranges = accuracy.rigs_to_measure(Parameters(), 3, 0), documented_ranges(Parameters())
-    assert list(rigs) == [
-        "nominal",
-        "quick corner",
-        "slow corner",
-        *(f"{kind} {k}" for kind in ("corner", "draw") for k in (1, 2, 3)),
-    ]
-    for name, rig in rigs.items():
-        for dotted, (low, high) in ranges.items():
-            section, _, field = dotted.partition(".")
-            value = getattr(getattr(rig, section), field)
-            assert low <= value <= high
-            if "corner" in name:
-                assert value in (low, high), "a corner has every figure at one end of its range"
-    assert rigs["quick corner"].valves.time_constant == 0.0015
-    assert rigs["slow corner"].mechanics.mass == 5.0
-    assert rigs == accuracy.rigs_to_measure(Parameters(), 3, 0)
-    assert rigs["draw 1"] != accuracy.rigs_to_measure(Parameters(), 3, 1)["draw 1"]
+from studies.accuracy.motions import MOTIONS, strong
 
 
 @pytest.mark.parametrize(("method", "order"), accuracy.EVALUATIONS.items())
@@ -55,20 +33,6 @@ def test_the_plants_own_step_errs_far_less_than_a_tracker() -> None:
     assert course.clear.all()
     assert np.all(position < 0.5e-6), position
     assert np.all(pressure < 5e-6), pressure
-
-
-def test_a_rig_that_meets_a_stop_is_said_and_left_out() -> None:
-    rig = Parameters().replace({"cylinder1.viscous_friction": 10.0, "cylinder2.viscous_friction": 10.0, "mechanics.mass": 5.0})
-    assert not accuracy.run_method([rig], strong, accuracy.runge_kutta, dynamics.INTEGRATION_STEP).clear[0]
-    nowhere = accuracy.errors(accuracy.run_method([rig], strong, accuracy.runge_kutta, 1e-3), accuracy.NOWHERE)
-    assert np.all(np.isinf(nowhere))
-
-
-def test_motions_stay_within_what_a_plant_takes() -> None:
-    for motion in (stick_slip, strong, smooth):
-        commands = np.array([motion(k)[0] for k in range(50)])
-        assert commands.shape == (50, 4)
-        assert np.abs(commands).max() <= 1
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """birthsim study speed: what it measures in processes of their own, and what it says where something is missing."""
 
 import json
-import math
 import shutil
 
 import pytest
@@ -40,13 +39,6 @@ def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypat
 def test_what_a_checkout_cannot_do_ends_the_measurement():
     with speed.Process(speed.HERE) as process, pytest.raises(ValueError, match="has ended; its last words are above"):
         process.measure("step", environment="BirthSIM/Nothing-v1", budget=0.01)
-
-
-def test_without_gcc_the_twin_has_no_speed(monkeypatch):
-    monkeypatch.setattr(bench, "has_compiler", lambda: False)
-    kernel, twin = bench._against_c(32, 0.01)
-    assert kernel > 0.0
-    assert math.isnan(twin)
 
 
 @pytest.mark.slow

@@ -1,31 +1,14 @@
-"""The bench: paired worlds, lost episodes and ratios in its figures, its tables and its pictures."""
+"""The comparison: settings, lost episodes and ratios in its figures, its tables and its pictures."""
 
 import csv
 import math
 
-import gymnasium
-import numpy as np
 import pytest
 
-from baselines.bench import evaluation
 from baselines.bench.pieces import controller_settings, file_stem
 from birthsim_env import Parameters
 from studies.comparison import figure as comparison_figures
-from studies.comparison.grid import (
-    ENVIRONMENTS,
-    METRICS,
-    MOVING,
-    PLANTS,
-    REFERENCE,
-    Conditions,
-    all_conditions,
-    cell_task,
-    costs,
-    gather,
-    run_cell,
-    settings_of,
-    statistics,
-)
+from studies.comparison.grid import METRICS, MOVING, REFERENCE, Conditions, costs, gather, statistics
 from studies.comparison.tables import OWN_HAND, data, losses, overview
 from tests.controllers.test_named_controllers import OWN
 
@@ -33,97 +16,6 @@ RIG = Parameters()
 CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
 PROBE = Conditions("BirthSIM/Probe-v2", "ideal", "nominal")
 INF = math.inf
-
-
-@pytest.fixture
-def worlds(monkeypatch):
-    """Plants (rows, N), references and forces over time of every environment made; episodes end after 0.4 s."""
-    made = []
-    make_vec = gymnasium.make_vec
-
-    def spied(*args, **kwargs):
-        env = make_vec(*args, max_episode_steps=400, **kwargs)
-        world = {"plant": None, "reference": [], "force": []}
-        made.append(world)
-        run, reset = env.simulation.run, env.reset
-
-        def recorded(periods):
-            world["reference"].append(env.reference.rows.copy())
-            world["force"].append(env.measurement.user_force.copy())
-            return run(periods)
-
-        def begun(**options):
-            result = reset(**options)
-            world["plant"] = env.simulation.plant.lane_parameters.copy()
-            return result
-
-        env.simulation.run, env.reset = recorded, begun
-        return env
-
-    monkeypatch.setattr(evaluation.gymnasium, "make_vec", spied)
-    monkeypatch.setattr(evaluation, "AT_ONCE", 4)
-    return made
-
-
-def cell(controller, conditions=PROBE, episodes=3, seed=4):
-    (settings,) = settings_of(controller, RIG).values()
-    return run_cell(**cell_task(settings, conditions, episodes, seed).settings)
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_every_controller_meets_the_same_worlds_and_every_episode_another(worlds, plant):
-    conditions = Conditions("BirthSIM/Circle-v1", "honest" if plant.endswith("-sensors") else "lab", plant)
-    law, weight = cell("backstepping", conditions), cell("backstepping-weight", conditions)
-    assert law["seeds"] == weight["seeds"] == [4, 5, 6]
-    for what in ("plant", "reference", "force"):
-        np.testing.assert_array_equal(worlds[0][what], worlds[1][what], err_msg=what)
-    assert law["metrics"]["error_rms_x"] != weight["metrics"]["error_rms_x"]
-    reference = np.array(worlds[0]["reference"])
-    assert len({lane.tobytes() for lane in np.moveaxis(reference, 2, 0)}) == 3
-    assert len({column.tobytes() for column in worlds[0]["plant"].T}) == (3 if PLANTS[plant] is True else 1)
-
-
-def test_the_scenario_is_the_same_with_every_plant(worlds):
-    for plant in PLANTS:
-        cell("backstepping", Conditions("BirthSIM/Circle-v1", "honest", plant))
-    for world in worlds[1:]:
-        np.testing.assert_array_equal(worlds[0]["reference"], world["reference"])
-
-
-def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
-    monkeypatch.setattr(evaluation, "LANES", 1)
-    batches = []
-
-    class Stopped(evaluation.Measures):
-        def __init__(self, *args):
-            batches.append(1)
-            super().__init__(*args)
-
-        def fallen(self):
-            if len(batches) == 2:
-                raise KeyboardInterrupt
-            return super().fallen()
-
-    monkeypatch.setattr(evaluation, "Measures", Stopped)
-    with pytest.raises(KeyboardInterrupt):
-        cell("backstepping", episodes=2)
-    assert "1 of 2 episodes" in capsys.readouterr().out
-
-
-def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
-    assert len(all_conditions()) == 30
-    moving = [conditions for conditions in all_conditions() if conditions.hand]
-    assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
-    assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
-    assert str(moving[0]) == "Circle, ideal sensors, drawn rig, moving hand: sine"
-    assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
-    assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
-        *("Circle", "Probe", "Descent", "Forceps", "Dystocia", "Vacuum")
-    ]
-    assert str(PROBE) == "Probe, ideal sensors, nominal rig"
-    drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]
-    assert {one.sensors for one in drawn} == {"honest"}, "the only ones whose figures can be drawn"
-    assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal rig"
 
 
 def test_settings_tell_a_file_from_its_next_version_and_controllers_have_files_of_their_own(tmp_path):
@@ -265,7 +157,9 @@ def test_lost_episodes_are_counted_by_environment(figures):
 def test_the_data_file_has_a_row_per_condition_metric_and_controller(figures):
     table = list(csv.DictReader(data(figures).splitlines()))
     assert {row["environment"] for row in table} == {CIRCLE.environment, PROBE.environment}
-    assert {(row["rig"], row["hand"]) for row in table if row["environment"] == CIRCLE.environment} == {("drawn", OWN_HAND)}
+    assert {(row["rig"], row["hand"]) for row in table if row["environment"] == CIRCLE.environment} == {
+        ("randomised", OWN_HAND)
+    }
     found = {(row["metric"], row["controller"]): row for row in table if row["environment"] == CIRCLE.environment}
     other = found["settled_rms", "other"]
     assert (other["unit"], other["median"], other["q95"], other["worst"]) == ("mm", "2", "lost", "lost")
@@ -290,17 +184,3 @@ def test_pictures_show_medians_with_intervals_and_name_what_is_lost(figures, dra
     labels = [text.get_text() for text in air.legends[0].get_texts()]
     assert labels == [REFERENCE, "other"]
     assert [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in air.axes[0].lines] == [(4.0, 20.0), (2.0, 5.0)]
-
-
-def test_ten_controllers_have_looks_of_their_own_and_a_legend_that_covers_nothing(figures, drawn, tmp_path):
-    law = at(figures, REFERENCE, CIRCLE)
-    names = [f"a rather long controller name {k}" for k in range(10)]
-    comparison_figures.draw_comparison([{**law, "controller": name, "plant": "nominal"} for name in names], tmp_path)
-    assert len({line.get_marker() for line in drawn["air_against_error"].axes[0].lines}) == 10
-    for figure in drawn.values():
-        figure.canvas.draw()
-        legend = figure.legends[0].get_window_extent()
-        around = [axes.get_tightbbox() for axes in figure.axes] + [text.get_window_extent() for text in figure.texts]
-        assert not any(legend.overlaps(box) for box in around)
-        assert legend.x0 >= 0
-        assert legend.x1 <= figure.bbox.width

@@ -14,7 +14,6 @@ from baselines.bench.measures import DISCOUNTS, TRACE
 from baselines.bench.metrics import UNITS, EpisodeMetrics
 from baselines.registry import make_controller
 from birthsim_env import Parameters
-from birthsim_env.info import FIELDS
 
 PROBE, CIRCLE = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
 RIG = Parameters()
@@ -63,47 +62,32 @@ def run(controller, name="it", episodes=3, seed=5, env=PROBE, **arguments) -> Ev
     return evaluate(env, controller, name, episodes, seed, progress=False, **arguments)
 
 
-def same_figures(one: Evaluation, other: Evaluation):
-    assert one.seeds == other.seeds
-    assert one.lost == other.lost
-    for name in UNITS:
-        np.testing.assert_array_equal(one.metrics[name], other.metrics[name], err_msg=name)
-    for mine, its in zip(one.traces, other.traces, strict=True):
-        np.testing.assert_array_equal(mine, its)
-
-
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_the_same_seeds_give_the_same_figures_with_one_controller_or_two(sensors):
-    law, arguments = BacksteppingController(), {"sensors": sensors, "duration": 0.3}
-    first, again = run(law, **arguments), run(law, **arguments)
-    same_figures(first, again)
-    same_figures(first, run(BacksteppingController(), **arguments))
-    other = run(law, seed=50, **arguments)
-    assert first.seeds == [5, 6, 7]
-    assert other.seeds == [50, 51, 52]
-    assert not set(first.metrics["error_rms_x"]) & set(other.metrics["error_rms_x"])
-
-
-def test_a_seed_means_the_same_world_however_many_episodes_run_beside_it(monkeypatch):
-    together = run(BacksteppingController(), episodes=5, duration=0.3)
+def test_a_seed_means_the_same_world_in_every_batch_and_for_a_law_that_was_used_before(sensors, monkeypatch):
+    law, arguments = BacksteppingController(), {"sensors": sensors, "duration": 0.3, "episodes": 5}
+    together = run(law, **arguments)
     monkeypatch.setattr(evaluation, "LANES", 2)
-    batches = run(BacksteppingController(), episodes=5, duration=0.3)
+    batches = run(law, **arguments)
     assert [trace.shape[1] for trace in batches.traces] == [2, 2, 1]
     assert together.seeds == batches.seeds == [5, 6, 7, 8, 9]
     for name in UNITS:
         np.testing.assert_array_equal(together.metrics[name], batches.metrics[name], err_msg=name)
+    assert not set(together.metrics["error_rms_x"]) & set(run(law, seed=50, **arguments).metrics["error_rms_x"])
 
 
-def test_figures_are_those_of_the_environment_step_by_step():
-    result = run(BacksteppingController(), episodes=2, seed=3, randomize="plant", duration=1.2, env=CIRCLE)
-    env = gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=1e-3, duration=1.2, randomize="plant")
+@pytest.mark.parametrize(("name", "good"), [("pid", True), ("backstepping", False)])
+def test_figures_are_those_of_the_environment_step_by_step(name, good):
+    setting = {"duration": 1.2, "randomize": "plant"}
+    result = run(make_controller(name, RIG), episodes=2, seed=3, env=CIRCLE, **setting)
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=1e-3, **setting)
     _, info = env.reset(seed=3)
-    law, errors, flows, openings = BacksteppingController(), [], [], []
+    law, errors, flows, openings, paid = make_controller(name, RIG), [], [], [], []
     for _ in range(1200):
         errors.append(1e3 * info["tracking_error"])
         flows.append(info["supply_flow"])
         openings.append(law.command(env.measurement, env.reference))
-        _, _, _, _, info = env.step(openings[-1].T)
+        _, rewards, _, _, info = env.step(openings[-1].T)
+        paid.append(rewards)
     size = np.array(errors)
     np.testing.assert_allclose(result.metrics["error_rms_x"], np.sqrt((size[..., 0] ** 2).mean(axis=0)))
     np.testing.assert_allclose(result.metrics["error_max_y"], np.abs(size[..., 1]).max(axis=0))
@@ -113,19 +97,8 @@ def test_figures_are_those_of_the_environment_step_by_step():
     np.testing.assert_allclose(result.metrics["saturation"], 100 * (np.abs(openings).max(axis=1) >= 1).mean(axis=0))
     np.testing.assert_array_equal(1e3 * result.traces[0], size[:: round(TRACE / 1e-3)])
     assert np.isnan(result.metrics["stiffness_error"]).all()
-
-
-@pytest.mark.parametrize(("name", "good"), [("pid", True), ("backstepping", False)])
-def test_returns_and_success_are_those_that_the_environment_pays_step_by_step(name, good):
-    result = run(make_controller(name, RIG), episodes=2, seed=3, duration=0.7, env=CIRCLE)
-    env = gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=1e-3, duration=0.7, randomize=True)
-    env.reset(seed=3)
-    law, paid = make_controller(name, RIG), []
-    for _ in range(700):
-        _, rewards, _, _, info = env.step(law.command(env.measurement, env.reference).T)
-        paid.append(rewards)
     for discount in DISCOUNTS:
-        weights = discount ** (0.1 * np.arange(700))
+        weights = discount ** (0.1 * np.arange(1200))
         np.testing.assert_allclose(result.returns[discount], weights @ np.array(paid), rtol=1e-10)
     assert result.success == info["is_success"].tolist() == [good, good]
 
@@ -138,8 +111,8 @@ def test_a_law_in_the_loop_has_the_figures_of_one_that_is_called_back(name, seed
     settings = {"seed": seeds[0], "episodes": len(seeds), "sensors": sensors, "duration": 4.0, "env": CIRCLE}
     inside = run(make_controller(name, RIG), **settings)
     called = run(spy := Spy(make_controller(name, RIG)), **settings)
-    same_figures(inside, called)
-    assert (inside.returns, inside.success) == (called.returns, called.success)
+    for what in ("seeds", "lost", "metrics", "returns", "success", "traces"):
+        np.testing.assert_equal(getattr(inside, what), getattr(called, what), err_msg=what)
     assert spy.calls == 4000
     assert sum(inside.lost) == (name == "pid")
 
@@ -152,26 +125,6 @@ def test_a_class_that_changes_command_is_called_back():
     still, law = (run(one, duration=0.3).metrics for one in (Still(), BacksteppingController()))
     assert max(still["saturation"]) == 0.0
     assert still["error_rms_x"] != law["error_rms_x"]
-
-
-def test_the_stiffness_test_tells_a_stiffer_law_from_a_softer_one():
-    measured = run(BacksteppingController(), duration=7.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
-
-    class Stiff:
-        law = BacksteppingController()
-
-        def reset(self, lanes=None):
-            self.law.reset(lanes)
-
-        def command(self, measurement, reference):
-            rows = reference.rows.copy()
-            rows[8:10] *= 1.5
-            return self.law.command(measurement, type(reference)(rows))
-
-    stiff = run(Stiff(), duration=7.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
-    assert math.isfinite(measured)
-    # With LuGre friction it is not exactly 50 % above.
-    assert 25 < 100 * ((100 + stiff) / (100 + measured) - 1) < 75
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -249,27 +202,12 @@ def test_an_interrupt_before_any_episode_is_complete_is_passed_on():
         run(Spy(interrupt_at=10))
 
 
-def test_a_controller_forgets_the_past_before_every_batch(monkeypatch):
+def test_a_controller_begins_anew_with_every_batch_and_is_called_at_the_rate_of_its_rig(monkeypatch):
     monkeypatch.setattr(evaluation, "LANES", 2)
-    spy = Spy()
-    run(spy, episodes=5, duration=0.05)
-    assert spy.resets == 3
-    assert spy.calls == 3 * 50
-
-
-def test_the_control_rate_is_that_of_the_rig():
-    spy = Spy(BacksteppingController(RIG.replace({"electronics.control_period": 0.002})))
-    run(spy, duration=0.5, parameters=RIG.replace({"electronics.control_period": 0.002}))
-    assert spy.calls == 250
-
-
-def test_commands_that_are_not_openings_stop_the_evaluation_by_name():
-    class Broken(BacksteppingController):
-        def command(self, measurement, reference, feedforward_force=None):
-            return np.full((4, measurement.position.shape[1]), np.nan)
-
-    with pytest.raises(ValueError, match=r"command\(\)\[0, 0\] = nan; allowed: spool openings"):
-        run(Broken())
+    rig = RIG.replace({"electronics.control_period": 0.002})
+    spy = Spy(BacksteppingController(rig))
+    run(spy, episodes=5, duration=0.1, parameters=rig)
+    assert (spy.resets, spy.calls) == (3, 3 * 50)
 
 
 def test_the_dictionary_is_json_and_says_everything():
@@ -306,7 +244,7 @@ def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_contr
     lines = table([one, other]).splitlines()
     cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
     assert cells["metric"] == ["unit", "law: median", "95 %", "max", "mine: median", "95 %", "max"]
-    assert set(lines[1]) == {"|", "-"}
+    assert set(lines[1]) == {"|", "-", " "}
     assert len({line.count("|") for line in lines}) == 1
     assert cells["error_rms_x"] == ["mm", "2", f"{np.quantile([1, 2, 9.87654], 0.95):.3g}", "9.88", "0.5", "lost", "lost"]
     # Tails are of the size: -30 % is as bad as +30 %.
@@ -315,18 +253,6 @@ def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_contr
     assert cells["lost episodes"] == ["", "0 of 3", "", "", "1 of 3", "", ""]
     assert cells["successful episodes"][1] == "0 of 0"
     assert len(lines) == 2 + 2 + 3
-    means = table([one], "mean").splitlines()
-    assert means[0].split("|")[3].strip() == "law: mean"
-    assert means[2].split("|")[3].strip() == f"{np.mean([1, 2, 9.87654]):.3g}"
-
-
-def test_the_environments_arguments_reach_it():
-    with pytest.raises(ValueError, match="sensors = 'none'; allowed: 'ideal', 'lab'"):
-        run(BacksteppingController(), sensors="none")
-    spy = Spy()
-    run(spy, duration=0.02, episodes=1)
-    assert set(FIELDS) >= {"tracking_error", "supply_flow"}
-    assert len(spy.commands) == 20
 
 
 def test_the_overview_says_which_episodes_were_never_settled_and_calls_the_lost_ones_lost():
@@ -334,4 +260,4 @@ def test_the_overview_says_which_episodes_were_never_settled_and_calls_the_lost_
     one.lost = [False, False, True]
     lines = overview([one]).splitlines()
     assert lines[1].split() == ["mine", "lost", "lost", "lost", "1", "of", "3"]
-    assert lines[2].strip() == "1 of 3 episodes were never settled and are left out above"
+    assert lines[2] == "mine: 1 of 3 episodes were never settled and are left out above"

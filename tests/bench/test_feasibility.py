@@ -7,12 +7,11 @@ import pytest
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, StiffnessSchedule, UserForce
-from birthsim_env.physics.compiled.lanes import MASS, Array
+from birthsim_env.physics.compiled.lanes import Array
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 from tests.oracles.closed_loop import FRICTIONLESS
-from tests.parts.test_own_parts import PerLane, spring
 
 PROBE = "BirthSIM/Probe-v2"
 RIG = Parameters()
@@ -59,15 +58,6 @@ def columns_at(place: Array, rig: Parameters = RIG) -> Array:
 def fraction(needed: Array, rig: Parameters = RIG) -> float:
     """The larger fraction of both cylinders for the forces ``needed`` (2,), N."""
     return float(max(max(n / push, -n / pull) for n, (push, pull) in zip(needed, strengths(rig), strict=True)))
-
-
-@pytest.mark.parametrize("place", [(0.5, 0.0), (0.42, -0.09), (0.58, 0.05)])
-def test_holding_still_takes_the_weight_along_each_cylinder(place: tuple[float, float]) -> None:
-    env = made(4, reference=Hold(place), randomize={"mechanics.mass": (2.0, 5.0), "cylinder1.coulomb_friction": (6.0, 25.0)})
-    masses = env.simulation.plant.lane_parameters[MASS]
-    assert np.ptp(masses) > 0.5
-    weight = columns_at(np.array(place)).T @ [0.0, 9.81]
-    np.testing.assert_allclose(required_strength_ratio(env), [fraction(mass * weight) for mass in masses], rtol=1e-9)
 
 
 def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_its_force() -> None:
@@ -126,12 +116,6 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
     assert not lost[::2].any()
     assert np.all(error[::2] < 1e-3)
     assert np.all(lost[1::2] | (error[1::2] > 0.01))
-
-
-def test_a_force_per_lane_is_a_force():
-    env, own = (gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, user_force=hand) for hand in (PerLane(), spring))
-    env.reset(seed=0), own.reset(seed=0)
-    np.testing.assert_allclose(required_strength_ratio(env), required_strength_ratio(own), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

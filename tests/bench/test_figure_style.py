@@ -1,69 +1,21 @@
 """What every figure has in common: the style, both formats, the same bytes again, and lines that a grey print tells apart."""
 
-import json
 import re
-from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
-from matplotlib.colors import to_rgb
 from PIL import Image
 
 from agents.reports.correction_figure import draw_corrections
-from agents.reports.learning_curves import draw_learning_curves
 from baselines.bench.evaluation import Evaluation
 from baselines.figures import style
 from baselines.figures.runs import episode_figure, error_over_time, figure4
-from baselines.figures.style import COLOURS, headline, legend_below, look, save
-from studies.comparison.figure import CONDITIONS, draw_comparison
-from studies.comparison.stiffness_figures import draw_studies
+from baselines.figures.style import headline, legend_below, save
 from studies.results import read_result
 from studies.shelf import declared, names
-from studies.stability.figure import stability_figure
 from studies.study import no_pictures
 from tests.figures import caught, contrast
-
-ROOT = Path(__file__).resolve().parent.parent.parent
-
-
-def grey(colour):
-    """Luminance, 0 black to 1 white, as a grey print or ``Image.convert("L")`` shows it."""
-    return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
-
-
-def cell(controller, sensors, plant):
-    said = {"median": 1.0, "low": 0.5, "high": 2.0}
-    place = {"environment": "BirthSIM/Circle-v1", "sensors": sensors, "plant": plant}
-    return {"controller": controller, **place, "metrics": {"settled_rms": said, "air": said}}
-
-
-def study(folder):
-    """Every figure of the studies."""
-    stiffness = {"setpoints": [1000, 4000], "error_percent": [[1, 2], [3, None]], "hunting_mm": [[1, 2], [3, None]]}
-    push = {"amplitudes": [2, 40], "error_percent": [[1, 2], [3, 4]]}
-    polar = {"angles": [0, 1.5, 3, 4.5], "stiffness": [[2000, 2100]] * 4, "setpoint": 2000}
-    ellipses = {"poses": [(0.5, 0)], "setpoint": [[3000, 800], [800, 1500]], "stiffness": [[[3000, 0], [0, 1500]]]}
-    pushed = {f"law, {friction}": push for friction in ("frictionless", "with friction")}
-    return draw_studies(
-        {"stiffness": {"law": stiffness}, "disturbance": pushed, "polar": {"law": polar}, "ellipses": {"law": ellipses}}, folder
-    )
-
-
-def learning(folder):
-    """Two validations of each: every one costs a bootstrap."""
-    paths = sorted((ROOT / "agents/policies/circle").glob("seed_*/training.json"))
-    trainings = [json.loads(path.read_text()) for path in paths]
-    return draw_learning_curves([{**training, "curve": training["curve"][:2]} for training in trainings], folder)
-
-
-def stability(folder):
-    axis = {"values": [1.0, 2.0], "label": "mass (kg)", "logarithmic": True}
-    variants = {"as it is": {"motion_mm": [[0.01, None], [1.0, 50.0]], "stable": [[True, False], [True, False]]}}
-    return stability_figure(
-        "rig", {"title": "Rigs", "x": axis, "y": axis, "variants": variants, "believed": (1.5, 1.5)}, "law, lab sensors", folder
-    )
 
 
 def record():
@@ -82,76 +34,48 @@ def controllers(folder):
     return error_over_time(evaluations, "BirthSIM/Circle-v1, 4 episodes from seed 0, ideal sensors, --randomize all", folder)
 
 
+def of_result(name):
+    return lambda folder: declared(name).draw(read_result(name), folder)
+
+
 DRAWINGS = {
-    "figure4": (lambda folder: figure4(record(), folder), {"figure4"}),
-    "episode": (lambda folder: episode_figure(record(), "BirthSIM/Circle-v1, pid, seed 0, lab sensors", folder), {"episode"}),
-    "controllers": (controllers, {"error_over_time"}),
-    "comparison": (
-        lambda folder: draw_comparison([cell(name, *where) for name in ("one", "other") for where in CONDITIONS], folder),
-        {"settled_error", "air_against_error"},
-    ),
-    "studies": (study, {"rendered_stiffness", "hunting", "disturbances", "stiffness_by_direction", "stiffness_ellipses"}),
-    "stability": (stability, {"stability_rig"}),
-    "learning": (learning, {"learning_curves"}),
-    "correction": (
-        lambda folder: draw_corrections(2 * (np.arange(5.0),), 0.9, 2 * (np.ones((2, 5)).cumsum(axis=1),), folder),
-        {"correction"},
-    ),
+    "figure4": lambda folder: figure4(record(), folder),
+    "episode": lambda folder: episode_figure(record(), "BirthSIM/Circle-v1, pid, seed 0, lab sensors", folder),
+    "controllers": controllers,
+    "correction": lambda folder: draw_corrections(2 * (np.arange(5.0),), 0.9, 2 * (np.ones((2, 5)).cumsum(axis=1),), folder),
 }
-
-
-MANY = ("comparison", "learned", "stability", "stiffness")
-"""Studies whose figures ``DRAWINGS`` has too, with fewer figures."""
-
-LONG = ("learning", "studies", "comparison", "stability")
-"""Figures that take seconds to draw twice."""
+UNIT = r"\((mm|µm|%|N|N/m|kN/m|kg|s|ms|Hz|-|N s/m|J|degrees|million|normal l/min)\)|% of|fraction of|^magnitude"
+RESULTS = {name: of_result(name) for name in names() if declared(name).draw is not no_pictures}
 
 
 @pytest.mark.parametrize(
-    ("draw", "names"),
-    [pytest.param(*case, id=name, marks=[pytest.mark.slow] * (name in LONG)) for name, case in DRAWINGS.items()],
+    "draw", [*DRAWINGS.values(), pytest.param(RESULTS["comparison"], marks=pytest.mark.slow)], ids=[*DRAWINGS, "comparison"]
 )
-def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, names, tmp_path):
+def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, tmp_path):
     for folder in (tmp_path / "one", tmp_path / "other"):
         folder.mkdir()
-        paths = draw(folder)
-        assert {path.name for path in paths} == {f"{name}.{kind}" for name in names for kind in ("png", "svg")}
-        assert all(path.is_file() for path in paths)
+        draw(folder)
         assert plt.get_fignums() == []
+    paths = sorted(folder.iterdir())
+    assert [path.suffix for path in paths] == [".png", ".svg"] * (len(paths) // 2)
     for path in paths:
         assert path.read_bytes() == (tmp_path / "one" / path.name).read_bytes()
         if path.suffix == ".svg":
-            text = path.read_text()
-            assert "<dc:date>" not in text
+            assert "<dc:date>" not in path.read_text()
         else:
             with Image.open(path) as image:
                 assert image.width >= 300
 
 
-@pytest.mark.parametrize(("draw", "names"), DRAWINGS.values(), ids=DRAWINGS)
-def test_every_figure_has_the_style_and_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", [*DRAWINGS, *RESULTS])
+def test_every_figure_has_the_style_and_every_axis_says_its_unit(name, tmp_path, monkeypatch):
     drawn = caught(monkeypatch)
-    draw(tmp_path)
-    assert len(drawn) == len(names)
+    {**DRAWINGS, **RESULTS}[name](tmp_path)
+    assert drawn
     assert {figure.get_suptitle(): wrong for figure, wrong in drawn if wrong} == {}
     for figure, _ in drawn:
         labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
-        assert [label for label in labels if not re.search(r"\((mm|%|N|N/m|kg|s|million|normal l/min)\)|% of", label)] == []
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in MANY))
-        for name in names()
-        if declared(name).draw is not no_pictures
-    ],
-)
-def test_every_figure_of_a_result_has_the_style(name, tmp_path, monkeypatch):
-    drawn = caught(monkeypatch)
-    declared(name).draw(read_result(name), tmp_path)
-    assert drawn
-    assert {figure.get_suptitle(): wrong for figure, wrong in drawn if wrong} == {}
+        assert [label for label in labels if not re.search(UNIT, label)] == []
 
 
 def test_what_the_style_forbids_is_found(tmp_path, monkeypatch):
@@ -189,24 +113,6 @@ def test_a_legend_has_a_label_once():
     assert [text.get_text() for text in legend.get_texts()] == ["same", "also"]
     assert legend.get_title().get_text() == "heading"
     plt.close(figure)
-
-
-def test_the_four_main_colours_lie_far_apart_in_grey():
-    shades = sorted(grey(colour) for colour in COLOURS[:4])
-    assert np.diff(shades).min() > 0.12
-    assert min(map(contrast, COLOURS)) > 3
-
-
-def test_controllers_that_look_alike_in_grey_differ_in_marker_and_those_of_one_colour_in_line_too():
-    looks = [look(k) for k in range(12)]
-    assert len({style["marker"] for style in looks}) == 12
-    for one, other in combinations(looks, 2):
-        assert one["color"] != other["color"] or one["linestyle"] != other["linestyle"]
-    assert len(set(COLOURS)) == len(COLOURS)
-
-
-def test_conditions_differ_without_colour():
-    assert len({(style["marker"], style["mfc"] == "white") for style in CONDITIONS.values()}) == len(CONDITIONS)
 
 
 def test_a_figure_of_another_name_has_other_identifiers(tmp_path):

@@ -1,145 +1,20 @@
-"""Stability maps: the hand against SciPy, what counts as stable, known corners of the maps, figures and the command."""
+"""Stability maps: what counts as stable, known corners of the maps, figures and the command."""
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
-from scipy.integrate import solve_ivp
 
 from baselines.bench.pieces import controller_settings
-from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.physics.compiled.lanes import STATES, Array
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.plant import Plant
+from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.stability import maps as stability
-from studies.stability.figure import _border, _edges, _places, stability_figure
-from studies.stability.maps import (
-    MAPS,
-    MOST_FORCE,
-    MOST_MOTION,
-    PLACE,
-    PNEUMATIC,
-    PUSH,
-    Axis,
-    Cases,
-    Map,
-    Window,
-    describe_map,
-    judge,
-    stability_tasks,
-    stable_up_to,
-)
+from studies.stability.figure import stability_figure
+from studies.stability.maps import MAPS, Axis, Cases, Map, Window, describe_map, judge, stability_tasks, stable_up_to
 from tests.console import OWN, call, strict
 
 RIG = Parameters()
-
-
-class Constant:
-    """Every valve at one opening, (4,); keeps what it saw."""
-
-    def __init__(self, *openings: float) -> None:
-        self.openings, self.seen = np.array(openings, dtype=float), list[Measurement]()
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        self.seen = []
-
-    def command(self, measurement: Measurement, reference: Reference) -> Array:
-        self.seen.append(measurement)
-        return np.repeat(self.openings[:, None], measurement.position.shape[1], axis=1)
-
-
-@pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A push at once, and a run of 0.15 s."""
-    for name, value in (("PUSHED", 0.0), ("RELEASED", 0.05), ("JUDGED", 0.1), ("END", 0.15)):
-        monkeypatch.setattr(stability, name, value)
-
-
-def held_by_scipy(rig: Parameters, hand: float, start: Array, seconds: float) -> Array:
-    """End effector (4, T) of the plant's equations with closed valves and a hand whose spring is part of the equations."""
-    plant, times = Plant(rig), np.arange(0, seconds - 1e-9, 1e-3)
-    plant.state = start
-    held = plant.end_effector()[:2]
-
-    def slope(time: float, state: Array, push: Array) -> Array:
-        plant.state = state.reshape(STATES, 1)
-        force = push - hand * (plant.end_effector()[:2] - held)
-        return plant.derivatives(plant.state, np.zeros((4, 1)), force).ravel()
-
-    state, path = start.ravel(), []
-    for part, push in ((times[:51], np.transpose([PUSH])), (times[50:], np.zeros((2, 1)))):
-        run = solve_ivp(slope, part[[0, -1]], state, "DOP853", part, args=(push,), rtol=1e-9, atol=1e-11, max_step=5e-4)
-        state = run.y[:, -1]
-        path += list(run.y.T[:-1])
-    path.append(state)
-    motion = []
-    for column in path:
-        plant.state = column.reshape(STATES, 1)
-        motion.append(plant.end_effector()[:, 0])
-    return np.array(motion).T
-
-
-@pytest.mark.usefixtures("short")
-@pytest.mark.parametrize("hand", [0.0, 2000.0, 30000.0])
-def test_the_hand_is_a_spring_without_energy_of_its_own(hand: float) -> None:
-    """Closed valves: the motion is that of equations that contain the spring; what is measured is push and spring."""
-    rig = RIG.replace({f"cylinder{i}.{name}_friction": 0.0 for i in (1, 2) for name in ("coulomb", "viscous")})
-    law, plant = Constant(0.0, 0.0, 0.0, 0.0), Plant(rig)
-    judge(Cases([rig], np.array([hand]), np.array([2000.0])), law)
-    got = np.array([np.concatenate([m.position, m.velocity])[:, 0] for m in law.seen]).T
-    np.testing.assert_allclose(got[:, 0], [*PLACE, 0, 0], rtol=0, atol=1e-12)
-    start = balanced_state(plant.lane_parameters, inverse_geometry(got[:2, :1], rig), None, np.transpose([PNEUMATIC]))
-    truth = held_by_scipy(rig, hand, start, 0.15)
-    assert np.ptp(got[0]) > 5e-4
-    np.testing.assert_allclose(got[:2], truth[:2], rtol=0, atol=5e-4 * np.ptp(got[0]))
-    for tick, measured in enumerate(law.seen):
-        push = np.array(PUSH) if tick < 50 else np.zeros(2)
-        np.testing.assert_allclose(measured.user_force[:, 0], push - hand * (got[:2, tick] - got[:2, 0]), rtol=0, atol=1e-8)
-
-
-def corners(name: str, rig: Parameters = RIG, points: int = 2) -> dict[str, Any]:
-    settings = controller_settings("admittance-backstepping", rig)
-    tasks = stability_tasks([name], settings, "ideal", points, 0)
-    return {
-        **describe_map(name, rig, points),
-        "variants": {label: task.work(**task.settings) for (_, label), task in tasks.items()},
-    }
-
-
-@pytest.mark.slow
-def test_the_corners_of_the_rigs_map() -> None:
-    """Fixed gains oscillate on a light rig with slow valves; those that yield come to rest, there but for half a millimetre."""
-    chart = corners("rig")
-    assert chart["x"]["values"] == [1.0, 12.0]
-    assert chart["y"]["values"] == [1.5, 6.0]
-    assert chart["believed"] == [4.0, 3.0]
-    found = {label: variant["stable"] for label, variant in chart["variants"].items()}
-    motion = {label: variant["motion_mm"] for label, variant in chart["variants"].items()}
-    assert found["as it is"][0][0]
-    assert found["as it is"][1] == [True, True]
-    assert motion["as it is"][0][1] < 1
-    assert found["gains that never yield"] == [[True, False], [True, True]]
-    assert motion["gains that never yield"][0][1] > 10
-    assert stable_up_to(chart, "gains that never yield") == [1.0, 12.0]
-
-
-@pytest.mark.slow
-def test_what_is_stable_with_a_hand() -> None:
-    """Less than 0.5 mm and 5 N; friction that is fed forward but not there drives a stiff hand, half of it less so."""
-    chart = corners("hand_friction", points=3)
-    hand, found = np.array(chart["x"]["values"]), chart["variants"]
-    for variant in found.values():
-        motion, stable = 1e-3 * np.array(variant["motion_mm"]), np.array(variant["stable"])
-        assert np.array_equal(stable, (motion < MOST_MOTION) & (hand * motion < MOST_FORCE))
-    assert not found["as it is"]["stable"][0][2]
-    assert np.all(np.array(found["as it is"]["stable"])[:, 0])
-    assert np.all(np.array(found["as it is"]["stable"])[1:])
-    assert found["half the friction fed forward"]["motion_mm"][0][2] < found["as it is"]["motion_mm"][0][2]
 
 
 def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,7 +23,7 @@ def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest
     monkeypatch.setattr(stability, "END", 0.01)
     monkeypatch.setattr(Window, "span", lambda self: next(spans))
     cases = Cases([RIG] * 5, np.array([0.0, 1000.0, 30000.0, 0.0, 0.0]), np.full(5, 2000.0))
-    verdict = judge(cases, Constant(0, 0, 0, 0))
+    verdict = judge(cases, make_controller("shut-valves", RIG))
     assert verdict.stable.tolist() == [True, True, False, False, False]
     assert verdict.lost.tolist() == [False, False, False, False, True]
 
@@ -157,47 +32,19 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pyte
     """Valves that drive both pistons out: lost, null in JSON, and said in the picture."""
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)
-    verdict = judge(Cases([RIG, RIG], np.array([0.0, 30000.0]), np.full(2, 2000.0)), Constant(1, -1, 1, -1))
-    assert verdict.lost.tolist() == [True, False]
-    assert not verdict.stable[0]
     own = tmp_path / "own.py"
     own.write_text(OWN)
-    monkeypatch.setitem(MAPS, "hand", Map("pushed out", *small_axes(), MAPS["hand"].cases, lambda rig: (None, None)))
+    verdict = judge(Cases([RIG, RIG], np.array([0.0, 30000.0]), np.full(2, 2000.0)), make_controller(f"{own}:Out", RIG))
+    assert verdict.lost.tolist() == [True, False]
+    assert not verdict.stable[0]
+    hand, asked = Axis("hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
+    monkeypatch.setitem(MAPS, "hand", Map("pushed out", hand, asked, MAPS["hand"].cases, lambda rig: (None, None)))
     (((key, label), task),) = stability_tasks(["hand"], controller_settings(f"{own}:Out", RIG), "ideal", None, 0).items()
     assert label == f"{own}:Out"
     chart = {**describe_map(key, RIG), "variants": {label: task.work(**task.settings)}}
     assert np.isnan(chart["variants"][f"{own}:Out"]["motion_mm"][0][0])
     stability_figure("own", chart, "with a file of one's own", tmp_path)
     assert "lost: ran into a stop" in "".join(re.findall("<!-- (.*?) -->", (tmp_path / "stability_own.svg").read_text()))
-
-
-def small_axes() -> tuple[Axis, Axis]:
-    return Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
-
-
-def test_axes_and_edges_of_cells() -> None:
-    """Even or by equal factors; edges halfway, also beyond the ends."""
-    np.testing.assert_allclose(Axis("", 1.0, 7.0, 4).values(), [1, 3, 5, 7])
-    np.testing.assert_allclose(Axis("", 1.0, 1000.0, 9, True).values(4), [1, 10, 100, 1000])
-    np.testing.assert_allclose(_edges(np.array([1.0, 3, 5]), False), [0, 2, 4, 6])
-    np.testing.assert_allclose(_edges(np.array([1.0, 100, 10000]), True), [0.1, 10, 1000, 100000])
-    np.testing.assert_allclose(_edges(np.array([2.0]), False), [1.5, 2.5])
-
-
-def test_a_logarithmic_side_begins_at_none() -> None:
-    """A logarithm has no zero: the first cell stands a factor before the second, and its tick says 0."""
-    values = [0.0, 100.0, 1000.0]
-    np.testing.assert_allclose(_places({"values": values, "logarithmic": True}), [10, 100, 1000])
-    np.testing.assert_allclose(_places({"values": values, "logarithmic": False}), values)
-
-
-def test_the_border_runs_between_stable_cells_and_others() -> None:
-    figure, axes = plt.subplots()
-    _border(axes, np.arange(4.0), np.arange(3.0), np.array([[True, True, False], [True, False, False]]))
-    upright, level = ({tuple(map(tuple, path.vertices)) for path in lines.get_paths()} for lines in axes.collections)
-    assert upright == {((2.0, 0.0), (2.0, 1.0)), ((1.0, 1.0), (1.0, 2.0))}
-    assert level == {((1.0, 1.0), (2.0, 1.0))}
-    plt.close(figure)
 
 
 def test_how_far_all_is_stable() -> None:

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from baselines.bench.statistics import (
-    LEVEL,
-    LOST_ERROR,
-    jsonable,
-    number,
-    penalize_lost,
-    quantile,
-    summarize,
-)
+from baselines.bench.statistics import LEVEL, LOST_ERROR, jsonable, number, penalize_lost, quantile, summarize
 from studies.comparison import paired
 from studies.comparison.paired import median_interval, paired_ratios, summary_with_interval
 

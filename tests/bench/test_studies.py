@@ -14,16 +14,7 @@ from birthsim_env.physics.geometry import inverse_geometry, joint_force
 from birthsim_env.physics.plant import Plant
 from studies.comparison import stiffness as studies
 from studies.comparison import stiffness_figures as study_figures
-from studies.comparison.stiffness import (
-    COUPLED,
-    STUDIES,
-    disturbance_study,
-    ellipse_study,
-    frictionless,
-    polar_study,
-    stiffness_study,
-    study_tasks,
-)
+from studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study
 
 RIG = Parameters()
 SMOOTH = frictionless(RIG)
@@ -85,38 +76,6 @@ def test_ellipse_study_recovers_any_matrix_and_marks_a_lost_pose(spring):
     for k in (0, 2):
         np.testing.assert_allclose(result["stiffness"][k], spring["stiffness"])
     np.testing.assert_array_equal(spring["probes"].stiffness[:, 0], [3000, 1500, 800])
-
-
-def test_on_the_frictionless_rig_ellipses_are_the_setpoint_where_it_does_not_couple_the_axes():
-    result = told(ellipse_study, SMOOTH, poses=((0.4, 0.05), (0.5, -0.015)), setpoint=((2000.0, 0.0), (0.0, 2000.0)))
-    for matrix in result["stiffness"]:
-        np.testing.assert_allclose(matrix, np.diag([2000.0, 2000.0]), rtol=0, atol=20)
-    # (18) drops the coupling: the law renders a matrix that is a fifth of the setpoint's norm off.
-    coupled = told(ellipse_study, SMOOTH, poses=((0.4, 0.05),), setpoint=COUPLED)["stiffness"][0]
-    assert 0.15 < np.linalg.norm(np.array(coupled) - COUPLED) / np.linalg.norm(COUPLED) < 0.4
-
-
-def test_the_neglected_weight_costs_most_under_low_disturbances():
-    pose, results = ((0.6, 0.08),), {}
-    for name in ("backstepping", "backstepping-weight"):
-        results[name] = disturbance_study(name, "", SMOOTH.to_dict(), amplitudes=(2.0, 20.0), poses=pose)
-    # m g along cylinder 2, whose slope is that of the end effector seen from its pivot, over 2000 N/m.
-    expected = 1e3 * 3 * 9.81 * 0.08 / math.hypot(*pose[0]) / 2000
-    errors = np.array(results["backstepping"]["error_mm"])
-    np.testing.assert_allclose(errors[0], expected, rtol=0.03)
-    assert np.min(results["backstepping"]["error_percent"][0]) > 9 * np.max(results["backstepping"]["error_percent"][1])
-    assert np.max(results["backstepping-weight"]["error_percent"]) < 3
-
-
-def test_studies_of_all_controllers_and_disturbances_of_the_law_alone():
-    tasks = study_tasks([{"controller": name, "source": "", "rig": RIG.to_dict()} for name in ("backstepping", "pid")], RIG)
-    assert set(tasks) == {(study, name) for study in STUDIES for name in ("backstepping", "pid")} | {
-        ("disturbance", f"backstepping, {label}") for label in ("with friction", "frictionless")
-    }
-    assert len({task.name for task in tasks.values()}) == len(tasks)
-    smooth = tasks["disturbance", "backstepping, frictionless"].settings["rig"]
-    assert smooth["cylinder1"]["coulomb_friction"] == smooth["cylinder2"]["coulomb_friction"] == 0
-    assert smooth["cylinder1"]["viscous_friction"] == 35
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.0), (0.0, -40.0), (30.0, 20.0)])
@@ -203,20 +162,3 @@ def test_pictures_show_medians_and_ranges_and_name_what_is_lost(drawn, tmp_path)
     left, right = drawn["disturbances"].axes
     assert (left.get_title("left"), right.get_title("left")) == ("Frictionless", "With friction")
     np.testing.assert_allclose(left.lines[0].get_ydata(), [200, 6])
-
-
-def test_pictures_of_ten_controllers_keep_titles_and_legends_apart(drawn, tmp_path):
-    names = [f"backstepping-with-something-{k}" for k in range(10)]
-    good = {"setpoints": [1000.0, 4000.0], "error_percent": [[1.0, 2.0], [3.0, 5.0]], "hunting_mm": [[1.0, 2.0], [4.0, 3.0]]}
-    polar = {"angles": [0.0, 2.0, 4.0], "setpoint": 2000.0, "stiffness": [[2000.0], [2000.0], [2000.0]]}
-    study_figures.draw_studies({"stiffness": dict.fromkeys(names, good), "polar": dict.fromkeys(names, polar)}, tmp_path)
-    for figure in drawn.values():
-        figure.canvas.draw()
-    figure = drawn["rendered_stiffness"]
-    legend = figure.legends[0].get_window_extent()
-    assert not legend.overlaps(figure.axes[0].get_tightbbox())
-    assert 0 <= legend.x0 < legend.x1 <= figure.bbox.width
-    assert len({(line.get_marker(), line.get_linestyle(), line.get_color()) for line in figure.axes[0].lines[:10]}) == 10
-    titles = [axes.title.get_window_extent() for axes in drawn["stiffness_by_direction"].axes if axes.get_visible()]
-    assert len(titles) == 10
-    assert not any(one.overlaps(other) for k, one in enumerate(titles) for other in titles[:k])

@@ -11,9 +11,12 @@ import pytest
 from llvmlite.binding import llvm_version_info
 
 from baselines.commands.command import perform_with
+from birthsim_build.code import ptx
 from birthsim_build.code.compiler import LEAST_LLVM
+from birthsim_build.code.elf import contents_of
 from birthsim_build.code.targets import HOST
-from birthsim_build.commands.build import Settings, main
+from birthsim_build.commands import build as loops
+from birthsim_build.device.machine import machine_named
 
 BUILT = (
     "--controller", "admittance-backstepping", "limited:pid", "--policy", "circle", "circle_honest_student",
@@ -48,11 +51,40 @@ def need_threads():
         pytest.skip(f"needs Linux on x86-64 or aarch64, and LLVM {LEAST_LLVM}")
 
 
-def build(target, folder, *options):
+def need_device(name):
+    """Skip where there is no such device."""
+    try:
+        machine_named(name)
+    except ValueError as missing:
+        pytest.skip(str(missing))
+
+
+def build(target, out, *options, command=loops):
     """The command, in this process."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["birthsim export", "--to", target, *options, "--out", str(folder)])
-        perform_with("birthsim export", Settings, main, "")
+        patch.setattr(sys, "argv", ["birthsim export", "--to", target, *map(str, options), "--out", str(out)])
+        perform_with("birthsim export", command.Settings, command.main, "")
+
+
+def fill(views, arrays):
+    """Give the lanes of a device what ``arrays`` of the native ones hold; None is what all lanes share."""
+    for view, array in zip(views, arrays, strict=True):
+        if view is not None:
+            view[...] = array
+
+
+def assert_fusing_changes_nothing(folder, kernel, least):
+    """Of code.ptx, whose ``kernel`` has at least so many bytes; what ptxas says of its memory, bytes."""
+    if ptx.assembler() is None:
+        pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
+    made = []
+    for fuses in ("true", "false"):
+        taken = ptx.assemble(folder / "code.ptx", folder / "code.cubin", "sm_90", "--fmad", fuses)
+        sections = contents_of((folder / "code.cubin").read_bytes())
+        made.append({name: content for name, content in sections.items() if not name.startswith(".note")})
+    assert made[0] == made[1]
+    assert len(made[0][f".text.birthsim_{kernel}"]) > least
+    return taken
 
 
 def assert_same_bits(one, other):

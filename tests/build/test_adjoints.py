@@ -1,6 +1,5 @@
 """The way back through a program: threads, here and in WebAssembly, compute the bits of ``TapedLoop``."""
 
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,16 +10,15 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 from birthsim_build.building import write_wasm
-from birthsim_build.code import ptx
 from birthsim_build.code.compiler import compile_object
-from birthsim_build.code.elf import contents_of, undefined_in
+from birthsim_build.code.elf import undefined_in
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.machine import Host
 from birthsim_build.device.program import Pieces, Program, program_of
 from birthsim_env.gradients import Recorder
 from birthsim_env.physics.compiled.lanes import PARAMETERS
-from tests.build.targets import assert_same_bits, need_linker, need_program, need_threads
+from tests.build.targets import assert_fusing_changes_nothing, assert_same_bits, fill, need_linker, need_program, need_threads
 from tests.build.test_threads import assert_exact
 
 CASES = {
@@ -29,7 +27,6 @@ CASES = {
     "a hand that feels": {"id": "BirthSIM/Probe-v2", "user_force": "guided"},
     "a law": {"id": "BirthSIM/CircleResidual-v1", "sensors": "lab"},
 }
-FAST = ("openings",)
 
 
 class Made(NamedTuple):
@@ -67,7 +64,7 @@ def back_here(made: Made, bars: Any) -> Any:
 
 
 @pytest.mark.parametrize("lanes", [1, 33, pytest.param(1000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("case", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in CASES])
+@pytest.mark.parametrize("case", [pytest.param(name, marks=pytest.mark.slow if name != "openings" else ()) for name in CASES])
 def test_a_thread_goes_back_as_a_lane(case: str, lanes: int) -> None:
     need_threads()
     here = made(lanes, **CASES[case])
@@ -76,9 +73,7 @@ def test_a_thread_goes_back_as_a_lane(case: str, lanes: int) -> None:
     for _ in range(3):
         actions = rng.uniform(-0.3, 0.3, simulation.action.shape)
         simulation.action[:], simulation.impacts[:] = actions, 0.0
-        for view, array in zip(there.views, here.pieces.arrays(), strict=True):
-            if view is not None:
-                view[...] = array
+        fill(there.views, here.pieces.arrays())
         simulation.step(actions)
         tape = there.new_tape(simulation.periods)
         assert there.advance(simulation.periods, tape) == 0
@@ -104,22 +99,15 @@ def test_webassembly_goes_back_with_the_same_bits(tmp_path: Path) -> None:
     simulation.action[:] = actions
     data, tape = np.zeros((program.rows, lanes)), np.zeros((program.tape(simulation.periods), lanes))
     bars = np.random.default_rng(2).normal(size=(len(loop.live), lanes))
-
-    def views() -> list[Any]:
-        return [region and region.of(data, lanes) for region in program.regions]
-
-    for view, array in zip(views(), here.pieces.arrays(), strict=True):
-        if view is not None:
-            view[...] = array
+    views = [region and region.of(data, lanes) for region in program.regions]
+    fill(views, here.pieces.arrays())
     for name, array in (("program", program.words), ("data", data), ("tape", tape), ("bars", bars)):
         array.tofile(tmp_path / name)
-    numbers = map(str, (lanes, simulation.periods, PARAMETERS))
-    subprocess.run(
-        [str(shutil.which("node")), str(Path(__file__).with_name("way_back.mjs")), str(tmp_path), *numbers], check=True
-    )
+    line = ["node", Path(__file__).with_name("way_back.mjs"), tmp_path, lanes, simulation.periods, PARAMETERS]
+    subprocess.run([str(word) for word in line], check=True)
     simulation.step(actions)
     data[:], tape[:] = (np.fromfile(tmp_path / name).reshape(-1, lanes) for name in ("data", "tape"))
-    for view, array in zip(views(), here.pieces.arrays(), strict=True):
+    for view, array in zip(views, here.pieces.arrays(), strict=True):
         assert view is None or view.tobytes() == array.tobytes()
     assert_same_bits(tape[PARAMETERS + len(loop.live) :], flat(here.recorder._last[0], lanes))
     assert_same_bits(tape[PARAMETERS : PARAMETERS + len(loop.live)], back_here(here, bars))
@@ -136,13 +124,5 @@ def test_the_way_back_is_exact_and_alone(tmp_path: Path, case: str) -> None:
         assert set(undefined_in((tmp_path / "code.o").read_bytes())) <= {"memset"}  # which every C has
     compile_object(functions, "ptx", tmp_path / "code.o", threads=threads)
     assert_exact((tmp_path / "code.ptx").read_text())
-    if ptx.assembler() is None:
-        pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
-    sections = {}
-    for fuses in ("true", "false"):
-        taken = ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
-        found = contents_of((tmp_path / "code.cubin").read_bytes())
-        sections[fuses] = {name: content for name, content in found.items() if not name.startswith(".note")}
-    assert sections["true"] == sections["false"]
-    assert len(sections["true"][".text.birthsim_backward"]) > 50_000
+    taken = assert_fusing_changes_nothing(tmp_path, "backward", 50_000)
     assert taken["spilled"] < 16 * 1024  # of all functions; that of the law has most

@@ -1,65 +1,118 @@
-"""What is built computes the bits of Python: closed loops, laws alone and the plant alone."""
+"""What is built computes the bits of Python: closed loops, laws alone and the plant alone; for other processors under qemu."""
 
+import json
 from functools import cache
 
+import numpy as np
 import pytest
 
-from birthsim_build.bundle import identifier
+from birthsim_build.building import build_c
+from birthsim_build.bundle import Bundle, identifier
+from birthsim_build.code.targets import HOST
+from birthsim_build.loops import plant_world
+from birthsim_env import Parameters, Plant
 from studies.targets import reference
 from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
-from studies.targets.running import ROW, library_rows, node_rows
-from tests.build.targets import assert_same_bits, need_program
+from studies.targets.running import EMULATED, ROW, emulated_rows, library_rows, node_rows
+from tests.build.targets import BUILT, assert_same_bits, build, need_linker, need_program
 
+LAW = "admittance-backstepping"
 CASES = [
-    ("ideal", "admittance-backstepping"),
-    ("lab", "admittance-backstepping"),
-    ("lab", "limited:pid"),
-    ("ideal", "residual:circle"),
-    ("lab", "residual:circle"),
-    ("ideal", "residual:circle_honest_student"),
-    ("lab", "residual:circle_honest_student"),
-]
+    ("ideal", LAW), ("lab", LAW), ("lab", "limited:pid"), ("ideal", "residual:circle"), ("lab", "residual:circle"),
+    ("ideal", "residual:circle_honest_student"), ("lab", "residual:circle_honest_student"),
+]  # fmt: skip
 OPENINGS = [ROW[f"opening_{name}"] for name in CHAMBERS]
+KINDS = {"ideal": "exact", "lab": "sampled"}
 recorded, law_openings, plant_states = cache(loop_rows), cache(reference.law_openings), cache(reference.plant_states)
+
+
+def need_emulator(target):
+    if HOST is None:
+        pytest.skip("qemu runs programs of Linux")
+    need_linker()
+    need_program(EMULATED[target][1], "qemu-user")
+
+
+@pytest.fixture(scope="module")
+def aarch64(tmp_path_factory):
+    need_emulator("aarch64")
+    folder = tmp_path_factory.mktemp("aarch64")
+    build("aarch64", folder, *BUILT)
+    return folder
 
 
 @pytest.fixture
 def in_node(wasm, tmp_path):
     need_program("node", "nodejs")
-    return lambda *make, **options: node_rows(wasm, list(make), tmp_path, PERIODS, **options)[0]
+    return lambda name, *make, **options: node_rows(wasm, list(make), tmp_path, PERIODS, **options)[0]
 
 
+@pytest.fixture
+def in_c(library):
+    return lambda name, *make, **options: library_rows(library, name, PERIODS, **options)
+
+
+@pytest.fixture
+def on_aarch64(aarch64):
+    return lambda name, *make: emulated_rows("aarch64", aarch64, name, PERIODS)
+
+
+@pytest.fixture(params=["in_node", "in_c"])
+def rows_of(request):
+    """Rows of a built loop, by its name in C; ``make`` is a method of ``Bundle`` and its arguments, for JavaScript."""
+    return request.getfixturevalue(request.param)
+
+
+@pytest.mark.parametrize("place", ["in_node", "in_c", pytest.param("on_aarch64", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("sensors", "controller"), CASES)
-def test_a_closed_loop_in_webassembly(in_node, sensors, controller):
-    rows = in_node("loop", {"scenario": "circle", "sensors": sensors, "controller": controller})
+def test_a_closed_loop(request, place, sensors, controller):
+    make = "loop", {"scenario": "circle", "sensors": sensors, "controller": controller}
+    rows = request.getfixturevalue(place)(f"circle_{sensors}_{identifier(controller)}", *make)
     assert_same_bits(rows[:, SHARED], recorded("circle", sensors, controller)[:, SHARED])
 
 
-@pytest.mark.parametrize(("sensors", "controller"), CASES)
-def test_a_closed_loop_in_c(library, sensors, controller):
-    rows = library_rows(library, f"circle_{sensors}_{identifier(controller)}", PERIODS)
-    assert_same_bits(rows[:, SHARED], recorded("circle", sensors, controller)[:, SHARED])
-
-
-def test_the_plant_alone_in_webassembly(in_node):
+def test_the_plant_alone(rows_of):
     inputs, states = plant_states()
-    assert_same_bits(in_node("plant", inputs=inputs)[:, ROW["y1"] : ROW["y1"] + 18], states)
+    assert_same_bits(rows_of("plant", "plant", inputs=inputs)[:, ROW["y1"] : ROW["y1"] + 18], states)
 
 
-def test_the_plant_alone_in_c(library):
-    inputs, states = plant_states()
-    assert_same_bits(library_rows(library, "plant", PERIODS, inputs)[:, ROW["y1"] : ROW["y1"] + 18], states)
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_a_law_alone_in_webassembly(in_node, sensors):
-    seen, openings = law_openings("admittance-backstepping", sensors)
-    rows = in_node("controller", "admittance-backstepping", sensors, inputs=as_inputs(seen))
+@pytest.mark.parametrize("sensors", KINDS)
+def test_a_law_alone(rows_of, sensors):
+    seen, openings = law_openings(LAW, sensors)
+    rows = rows_of(f"law_{identifier(LAW)}_{KINDS[sensors]}", "controller", LAW, sensors, inputs=as_inputs(seen))
     assert_same_bits(rows[:, OPENINGS], openings)
 
 
-@pytest.mark.parametrize(("sensors", "kind"), [("ideal", "exact"), ("lab", "sampled")])
-def test_a_law_alone_in_c(library, sensors, kind):
-    seen, openings = law_openings("admittance-backstepping", sensors)
-    rows = library_rows(library, f"law_admittance_backstepping_{kind}", PERIODS, as_inputs(seen))
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", KINDS)
+def test_a_law_on_cortex_m7(tmp_path, sensors):
+    need_emulator("cortex-m7")
+    build("cortex-m7", tmp_path, "--controller", LAW, "--sensors", sensors)
+    seen, openings = law_openings(LAW, sensors)
+    rows = emulated_rows("cortex-m7", tmp_path, f"law_{identifier(LAW)}_{KINDS[sensors]}", PERIODS, seen)
     assert_same_bits(rows[:, OPENINGS], openings)
+
+
+OPTIONS = {
+    "worn": {"valves.deadband": 0.02, "valves.hysteresis": 0.01},
+    "all": {
+        "air.supply_conductance": 6e-9, "air.supply_volume": 2e-3, "chambers.tube_length": 1, "mechanics.mode_frequency": 30,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_the_plant_with_options(tmp_path, options):
+    """Worn valves, tubes, a supply that droops and a structure that bends."""
+    need_linker()
+    if HOST is None:
+        pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")
+    rig, periods = Parameters().replace(options), 500
+    (tmp_path / "build.json").write_text(json.dumps(build_c(Bundle(rig, {}, {}, plant_world(rig)), HOST, tmp_path)))
+    inputs, _ = plant_states(periods)
+    plant, states = Plant(rig), np.empty((periods, 18))
+    given = np.array([inputs[name] for name in (*(f"opening_{chamber}" for chamber in CHAMBERS), "force_x", "force_y")])
+    for k, state in enumerate(states):
+        state[:] = plant.advance(given[:4, [k]], given[4:, [k]], 0.001)[:, 0]
+    assert_same_bits(library_rows(tmp_path, "plant", periods, inputs)[:, ROW["y1"] : ROW["y1"] + 18], states)

@@ -10,22 +10,21 @@ import pytest
 from birthsim_build.code import ptx, threads
 from tests.console import call
 
-
-def test_an_old_llvm_is_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", (20, 1, 8))
-    status, _, complained = call("export", monkeypatch, capsys, "--to", "wasm", "--out", tmp_path / "out")
-    assert (status, complained) == (
-        2, "birthsim export: error: llvmlite has LLVM 20.1.8; allowed: 22 or later, llvmlite 0.50\n"
-    )  # fmt: skip
-    assert not (tmp_path / "out").exists()
+LACKS = [
+    # what is asked for, LLVM, what is not there, what is said
+    ("wasm", (20, 1, 8), "compiler.find_spec", "llvmlite has LLVM 20.1.8; allowed: 22 or later, llvmlite 0.50"),
+    ("wasm", (22, 1, 0), "compiler.find_spec", "pip install 'birthsim[build]'"),
+    ("cubin", (22, 1, 0), "ptx.assembler", "a cubin needs NVIDIA's ptxas: pip install 'birthsim[cuda]'"),
+]
 
 
-def test_without_a_linker_it_says_what_to_install(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", (22, 1, 0))
-    monkeypatch.setattr("birthsim_build.code.compiler.find_spec", lambda _: None)
-    status, _, complained = call("export", monkeypatch, capsys, "--to", "wasm", "--out", tmp_path / "out")
+@pytest.mark.parametrize(("target", "llvm", "gone", "said"), LACKS)
+def test_without_what_it_needs_it_says_what_to_install(target, llvm, gone, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", llvm)
+    monkeypatch.setattr(f"birthsim_build.code.{gone}", lambda *_: None)
+    status, _, complained = call("export", monkeypatch, capsys, "--to", target, "--out", tmp_path / "out")
     assert status == 2
-    assert "pip install 'birthsim[build]'" in complained
+    assert said in complained
     assert not (tmp_path / "out").exists()
 
 
@@ -68,13 +67,6 @@ def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
     assert max(about["rows"].values()) < words[threads.ROWS]
 
 
-def test_a_cubin_needs_ptxas_and_only_a_cubin_a_gpu(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("birthsim_build.code.ptx.assembler", lambda: None)
-    status, _, complained = call("export", monkeypatch, capsys, "--to", "cubin", "--out", tmp_path / "out")
-    assert (status, complained) == (
-        2, "birthsim export: error: a cubin needs NVIDIA's ptxas: pip install 'birthsim[cuda]'\n"
-    )  # fmt: skip
-    _, _, complained = call("export", monkeypatch, capsys, "--to", "ptx", "--gpu", "sm_90", "--out", tmp_path / "out")
-    assert complained == "birthsim export: error: --gpu with ptx; allowed: with cubin\n"
+def test_a_gpu_is_named_by_its_architecture(tmp_path):
     with pytest.raises(ValueError, match="gpu = 'h100'; allowed: sm_"):
         ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "h100")

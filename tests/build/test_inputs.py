@@ -1,6 +1,7 @@
-"""What acts on a built loop from outside does what the same does in Python: a person's hand, setpoints, another law."""
+"""What acts on a built loop from outside: setpoints and forces that pass over, another law, parts that are left out.
 
-import math
+That a person's hand and setpoints give the bits of the same in Python, ``tests/live/rig/test_bits.py`` shows.
+"""
 
 import numpy as np
 import pytest
@@ -8,87 +9,17 @@ import pytest
 from birthsim_build.image import HEAD, LEFT_OUT
 from birthsim_build.layout import ROWS
 from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
-from birthsim_env import StiffnessSchedule, UserForce
-from birthsim_env.parts.scenarios import SCENARIOS
 from studies.targets.reference import PERIODS, SHARED, loop_rows
 from studies.targets.running import ROW, library_loop, node_rows
 from tests.build.targets import assert_same_bits, need_program
 
 LOOP = {"scenario": "circle", "sensors": "ideal", "controller": "admittance-backstepping"}
-STIFFNESS, DAMPING, LIMIT = 800.0, 20.0, 25.0
-HELD = np.where((np.arange(PERIODS) // 300) % 2, 1.0, 0.0)
-POINTER = np.array([0.5 + 0.02 * np.sin(0.01 * np.arange(PERIODS)), 0.03 * np.cos(0.013 * np.arange(PERIODS))])
-PUSH = np.where(np.arange(PERIODS) > 900, 7.0, 0.0)
 
 
 @pytest.fixture
 def in_node(wasm, tmp_path):
     need_program("node", "nodejs")
     return lambda choice=LOOP, **options: node_rows(wasm, ["loop", choice], tmp_path, PERIODS, **options)[0]
-
-
-class Held(UserForce):
-    """The scenario's hand, another push along y, and a spring to the pointer that pulls no harder than its limit."""
-
-    closed_loop = True
-
-    def __init__(self):
-        self.own = SCENARIOS["circle"].nominal()[1]
-        self.jump_rate = self.own.jump_rate
-
-    def prepare(self, num_envs):
-        self.own.prepare(num_envs)
-
-    def begin(self, lane, rng):
-        self.own.begin(lane, rng)
-
-    def force(self, time, position, velocity):
-        forces, now = self.own.force(time, position, velocity), round(float(time[0, 0]) * 1000) - 1
-        if now >= 0:
-            forces[0, 1, 0] += PUSH[now]
-            if HELD[now]:
-                pull = STIFFNESS * (POINTER[:, now] - position[:, 0]) - DAMPING * velocity[:, 0]
-                size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1])
-                forces[0, :, 0] += pull * (LIMIT / size) if size > LIMIT else pull
-        return forces
-
-
-def test_a_person_s_hand(in_node):
-    constants = {"pointer_stiffness": STIFFNESS, "pointer_damping": DAMPING, "pointer_limit": LIMIT}
-    inputs = {name: np.full(PERIODS, value) for name, value in constants.items()}
-    inputs |= {"pointer_held": HELD, "pointer_x": POINTER[0], "pointer_y": POINTER[1], "add_force_y": PUSH}
-    rows = in_node(inputs=inputs)
-    expected = loop_rows("circle", "ideal", LOOP["controller"], user_force=Held())
-    assert_same_bits(rows[:, SHARED], expected[:, SHARED])
-
-
-ASKED = np.where(np.arange(PERIODS) >= 700, 3100.0, 2000.0)
-
-
-class Chosen(StiffnessSchedule):
-    """A person's Kclx from the first period on, and 150 N/m more than the scenario asks for along y."""
-
-    def __init__(self):
-        self.own = SCENARIOS["circle"].nominal()[2]
-
-    def prepare(self, num_envs):
-        self.own.prepare(num_envs)
-
-    def begin(self, lane, rng):
-        self.own.begin(lane, rng)
-
-    def sample(self, time):
-        rows, now = np.array(self.own.sample(time)), round(float(time[0]) * 1000) - 1
-        if 0 <= now < PERIODS:
-            rows[0], rows[1] = ASKED[now], rows[1] + 150.0
-        return rows
-
-
-def test_setpoints_of_a_person(in_node):
-    inputs = {"keep_Kclx": np.zeros(PERIODS), "add_Kclx": ASKED, "add_Kcly": np.full(PERIODS, 150.0)}
-    rows = in_node(inputs=inputs)
-    expected = loop_rows("circle", "ideal", LOOP["controller"], stiffness=Chosen())
-    assert_same_bits(rows[:, SHARED], expected[:, SHARED])
 
 
 def test_setpoints_and_a_hand_s_force_pass_over(in_node):
@@ -104,11 +35,6 @@ def test_setpoints_and_a_hand_s_force_pass_over(in_node):
         passed = u**3 * (10 - 15 * u + 6 * u * u)
         assert found[at:] == pytest.approx(start + passed * (end - start), rel=1e-9, abs=1e-9)
         assert found[-1] == end
-
-
-def test_one_valve_per_cylinder(in_node):
-    rows = in_node({**LOOP, "valves": "one_valve"})
-    assert_same_bits(rows[:, SHARED], loop_rows("circle", "ideal", LOOP["controller"], valves="one_valve")[:, SHARED])
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])

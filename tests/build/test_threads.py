@@ -8,24 +8,23 @@ import pytest
 from llvmlite.binding import llvm_version_info
 
 from baselines.registry import LISTED
-from birthsim_build.code import ptx, threads
+from birthsim_build.code import threads
 from birthsim_build.code.compiler import LEAST_LLVM, compile_object
-from birthsim_build.code.elf import contents_of
 from birthsim_build.device.export import write_programs
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import controlled, pieces_of
 from birthsim_build.device.machine import Host
-from birthsim_build.device.program import key_of, program_of
+from birthsim_build.device.program import key_of
 from birthsim_build.layout import LAYOUT
 from birthsim_env import Parameters
 from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.build.targets import need_threads
+from tests.build.targets import assert_fusing_changes_nothing, fill, need_threads
 
 SEED = 2_000_000
-WAY = "birthsim_env.parts.references:_path_stage"
+WAY = "birthsim_env.parts.references:_path"
 LOOKS = {"baselines.bench.measures:_see", "baselines.bench.measures:_pay"}
 """What measures an evaluation."""
 
@@ -45,9 +44,7 @@ def both(lanes, **loop):
     episodes, other = begun(lanes, **loop), begun(3 if lanes == 2 else 2, **loop)
     pieces = pieces_of(episodes.simulation)
     made = Lanes(Host(), pieces, pieces_of(other.simulation), lanes)
-    for view, array in zip(made.views, pieces.arrays(), strict=True):
-        if view is not None:
-            view[...] = array
+    fill(made.views, pieces.arrays())
     return episodes.simulation, pieces, made
 
 
@@ -55,37 +52,6 @@ def differing(pieces, made):
     """Numbers of the arrays that differ in a bit."""
     pairs = enumerate(zip(made.views, pieces.arrays(), strict=True))
     return [k for k, (view, array) in pairs if view is not None and view.tobytes() != array.tobytes()]
-
-
-def test_a_program_fills_its_lanes_and_finds_its_tables():
-    many, other = begun(5, sensors="lab"), begun(2, sensors="lab")
-    pieces = pieces_of(many.simulation)
-    program = program_of(pieces, pieces_of(other.simulation), pieces.functions)
-    lanes, words = 7, program.words.copy()
-    data = np.full((program.rows, lanes), -1)
-    place = words.ctypes.data, 0, data.ctypes.data, lanes
-    assert threads.place(*place) == 0
-    # What is placed may be placed anew.
-    before = words.copy()
-    threads.place(*place)
-    np.testing.assert_array_equal(words, before)
-    for lane in range(lanes + 1):
-        threads.fill(words.ctypes.data, lane, 0, 0)
-    views = [region and region.of(data, lanes) for region in program.regions]
-    for view, region, array in zip(views, program.regions, pieces.arrays(), strict=True):
-        if region is not None:
-            for lane in range(lanes):
-                np.testing.assert_array_equal(view[region.at(lane)], array[region.at(0)])
-    addresses = {key_of(array): view for view, array in zip(views, pieces.arrays(), strict=True)}
-    first = threads.HEAD + threads.MOVE * words[threads.MOVES]
-    tables = 0
-    for k, stage in enumerate(pieces.every):
-        described = (words[first + threads.STAGE * k + 5] - words.ctypes.data) // 8
-        for t, table in enumerate(stage.tables):
-            address, *shape = words[described + 5 * t : described + 5 * t + 1 + table.ndim]
-            assert (address, tuple(shape)) == (addresses[key_of(table)].ctypes.data, addresses[key_of(table)].shape)
-            tables += 1
-    assert tables > 5
 
 
 EXACT = re.compile(
@@ -121,12 +87,6 @@ def test_what_is_not_exact_is_found(wrong):
         assert_exact(f"mul.rn.f64 %fd1, %fd2, %fd3;\n{wrong}")
 
 
-def test_a_users_python_is_refused_by_name():
-    episodes = Episodes(assemble(2, "circle", user_force=lambda time: (0.0, 0.0)))
-    with pytest.raises(ValueError, match=r"user_force = .*in Python; allowed on a device"):
-        pieces_of(episodes.simulation)
-
-
 CASES = {
     "openings": {"sensors": "ideal"},
     "flows of one valve": {"sensors": "honest", "scenario": "forceps", "action_mode": "flow", "valves": "one_valve"},
@@ -160,22 +120,15 @@ def test_a_hundred_thousand_threads():
     assert len(np.unique(simulation.plant.state[0])) > 99_000
 
 
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory):
-    """PTX of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
-    folder = tmp_path_factory.mktemp("ptx")
-    made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
-    made += [
-        begun(2, sensors=sensors, controller=name) for name in (*LISTED, "residual:circle") for sensors in ("ideal", "lab")
-    ]
-    functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
-    compile_object(sorted(functions | LOOKS), "ptx", folder / "all.o", threads=threads.Threads(1024))
-    return folder / "all.ptx"
-
-
 @pytest.mark.slow
-def test_ptx_of_all_stages_is_exact_and_alone(everything):
-    text = everything.read_text()
+def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
+    """Of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
+    made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
+    laws = (*LISTED, "residual:circle")
+    made += [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
+    functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
+    compile_object(sorted(functions | LOOKS), "ptx", tmp_path / "all.o", threads=threads.Threads(1024))
+    text = (tmp_path / "all.ptx").read_text()
     assert_exact(text)
     assert len(re.findall(r"^\.visible \.entry", text, re.MULTILINE)) == 3
     assert ".visible .func" not in text
@@ -186,17 +139,9 @@ def test_ptx_of_all_stages_is_exact_and_alone(everything):
 
 @pytest.mark.slow
 def test_fusing_is_given_no_chance(tmp_path):
-    if ptx.assembler() is None:
-        pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
     loop = pieces_of(begun(2, sensors="lab", controller="admittance-backstepping").simulation)
     compile_object(loop.functions, "ptx", tmp_path / "code.o", threads=threads.Threads(448))
-    made = {}
-    for fuses in ("true", "false"):
-        taken = ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
-        sections = contents_of((tmp_path / "code.cubin").read_bytes())
-        made[fuses] = {name: content for name, content in sections.items() if not name.startswith(".note")}
-    assert made["true"] == made["false"]
-    assert len(made["true"][".text.birthsim_advance"]) > 100_000
+    taken = assert_fusing_changes_nothing(tmp_path, "advance", 100_000)
     # 448 rows, what stages keep beside them, and registers that did not fit.
     assert taken["memory"] < 6 * 1024
     assert taken["spilled"] < 2 * 1024

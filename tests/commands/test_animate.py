@@ -1,6 +1,7 @@
 """birthsim animate: both runs are those of the environments, at the same instants, and what is written plays in real time."""
 
 import re
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -8,34 +9,23 @@ import pytest
 from PIL import Image
 
 import birthsim_env
-from baselines.commands import animate
+from baselines.commands import animate, episodes
 from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from baselines.staged import driving
-from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.drawing.pair import Pair
 from tests.console import call
+from tests.env.test_rendering import SCENE
 
 RIG = birthsim_env.Parameters()
 
 
-def scene(**values):
-    fixed = {
-        "time": 1.0,
-        "piston": (0.0, 0.02),
-        "target": (0.5, 0.0),
-        "compliant_target": (0.52, 0.0),
-        "user_force": (100.0, 0.0),
-        "pressures": (2e5, 3e5, 4e5, 5e5),
-        "stiffness": (4000.0, 4000.0),
-        "path": np.zeros((0, 2)),
-        "title": "test",
-    }
-    return Scene(**{**fixed, **values})
+SHOWN = replace(SCENE, piston=(0.0, 0.02), target=(0.5, 0.0), compliant_target=(0.52, 0.0), user_force=(100.0, 0.0))
 
 
 @pytest.fixture
 def pair():
-    return PairRenderer(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
+    return Pair(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
 
 
 @pytest.mark.parametrize("suffix", ["webp", pytest.param("gif", marks=pytest.mark.slow)])
@@ -78,24 +68,16 @@ def test_a_take_shows_the_run_of_the_environment():
     assert found.scenes[-1].user_force == pytest.approx(tuple(info["user_force"]))
 
 
-def test_a_lost_run_stands_still_with_an_infinite_error(monkeypatch):
-    class Slam:
-        def reset(self, lanes=None):
-            pass
-
-        def command(self, measurement, reference):
-            return np.array([[1.0], [-1.0], [1.0], [-1.0]])
-
-    def taken(controller):
-        env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.001, actuation=driving(controller, "it"))
+def test_a_lost_run_stands_still_with_an_infinite_error():
+    def taken(name):
+        env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.001, actuation=driving(make_controller(name, RIG), "it"))
         return take(env, 0, (0.0, 1.5), 10, lambda count: None)
 
-    found = taken(Slam())
+    found = taken("slammed-valves")
     assert np.isinf(found.errors[-1])
     assert found.scenes[-1].piston == found.scenes[-2].piston
     assert found.scenes[-1].time == pytest.approx(1.5)
-    other = taken(make_controller("pid", RIG))
-    frames = animate.draw([found, other], RIG, "lost", ["slam", "pid"], (0.0, 1.5), 10, lambda count: None)
+    frames = animate.draw([found, taken("pid")], RIG, "lost", ["slam", "pid"], (0.0, 1.5), 10, lambda count: None)
     assert len(frames) == 16
 
 
@@ -107,7 +89,7 @@ def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch, ca
         asked.append((name, options))
         return make_controller(name, rig, **options)
 
-    monkeypatch.setattr(animate, "make_controller", spied)
+    monkeypatch.setattr(episodes, "make_controller", spied)
     path = tmp_path / "pull.webp"
     options = ("--controller", "pid", "residual", "--begin", 0.0, "--end", 1.0, "--rate", 10, "--out", path)
     assert call("animate", monkeypatch, capsys, *options)[0] == 0
@@ -116,19 +98,12 @@ def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch, ca
 
 def test_both_halves_have_one_scale_and_their_own_error(pair):
     times = np.array([0.0, 0.5, 1.0])
-    same = pair.frame((scene(), scene()), times, 2 * (np.array([0.0, 0.005, 0.003]),))
+    same = pair.frame((SHOWN, SHOWN), times, 2 * (np.array([0.0, 0.005, 0.003]),))
     left, right = same[70:595, :478], same[70:595, 482:960]
     assert np.abs(left[:, 2:476].astype(int) - right[:, :474]).mean() < 1.0
-    other = pair.frame((scene(), scene()), times, (np.array([0.0, 0.005, 0.003]), np.array([0.0, 0.001, 0.009])))
+    other = pair.frame((SHOWN, SHOWN), times, (np.array([0.0, 0.005, 0.003]), np.array([0.0, 0.001, 0.009])))
     assert (other[:, :480] == same[:, :480]).all()
     assert (other[:, 480:] != same[:, 480:]).any()
-
-
-def test_a_frame_depends_on_what_it_shows_only(pair):
-    times, errors = np.array([0.0, 1.0]), 2 * (np.array([0.0, 0.004]),)
-    first = pair.frame((scene(), scene(piston=(0.03, -0.05))), times, errors)
-    pair.frame((scene(piston=(-0.05, 0.15)), scene(user_force=(0.0, 0.0))), np.arange(0.0, 2.0, 0.1), 2 * (np.full(20, 0.02),))
-    np.testing.assert_array_equal(pair.frame((scene(), scene(piston=(0.03, -0.05))), times, errors), first)
 
 
 @pytest.mark.parametrize(
@@ -136,16 +111,5 @@ def test_a_frame_depends_on_what_it_shows_only(pair):
 )
 def test_what_is_not_finite_is_left_out(values, pair):
     assert pair.frame(
-        (scene(**values), scene()), np.array([0.0, 1.0]), (np.array([0.0, np.inf]), np.array([np.nan, 0.1]))
+        (replace(SHOWN, **values), SHOWN), np.array([0.0, 1.0]), (np.array([0.0, np.inf]), np.array([np.nan, 0.1]))
     ).any()
-
-
-def test_an_interrupt_ends_without_a_file(monkeypatch, capsys, tmp_path):
-    def interrupted(*arguments):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(animate, "take", interrupted)
-    status, _, complained = call("animate", monkeypatch, capsys, "--out", tmp_path / "a.webp")
-    assert status == 130
-    assert "interrupted" in complained
-    assert list(tmp_path.iterdir()) == []

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from birthsim_env.files import whole_results
-from tests.console import PATIENCE, ROOT
+from birthsim_env.files import own_folder, whole_results
+from tests.console import PATIENCE, ROOT, call
 
 LOADING = """
 import sys, time
@@ -74,6 +74,40 @@ def test_a_signal_ends_a_command_in_one_line(program, ending, said):
             process.kill()
     expected = f"birthsim tune: {said}\n" if program == LOADING else "birthsim-x: terminated\n"
     assert (process.returncode, complained) == (128 + number, expected)
+
+
+BUSY = {
+    "evaluate --env BirthSIM/Probe-v2 --out out": "agents.commands.evaluate.run_tasks",
+    "animate --out out.webp": "baselines.commands.animate.take",
+    "identify log.csv --out rig.toml": "baselines.commands.identify.read_trial",
+    "tune --controller pid --out out": "baselines.commands.tune.costs",
+}
+"""A command, and what it is doing when Ctrl-C comes."""
+
+
+@pytest.mark.parametrize("line", BUSY)
+def test_ctrl_c_before_anything_is_complete_leaves_no_results(line, tmp_path, monkeypatch, capsys):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(BUSY[line], interrupt)
+    command, *options = line.split()
+    status, _, complained = call(command, monkeypatch, capsys, *options)
+    assert status == 130
+    assert complained.endswith(f"birthsim {command}: interrupted\n")
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} <= {".lock", "trials.journal"}
+
+
+@pytest.mark.parametrize(("line", "folder"), [("evaluate --env BirthSIM/Probe-v2 --out .", ""), ("train --out .", "seed_0")])
+def test_a_folder_has_one_process_at_a_time(line, folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    command, *options = line.split()
+    with own_folder(tmp_path / folder):
+        status, _, complained = call(command, monkeypatch, capsys, *options)
+    assert status == 2
+    assert complained.endswith("is in use by another process; allowed: to wait for it, or another folder\n")
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {".lock"}
 
 
 @pytest.mark.parametrize("program", [SWALLOWED, READING], ids=["swallowed", "while options are read"])

@@ -6,8 +6,10 @@ from functools import partial
 
 import pytest
 
-from baselines.bench.metrics import UNITS
-from birthsim_env.files import own_folder
+from baselines.bench.evaluation import evaluate
+from baselines.registry import make_controller
+from birthsim_env import Parameters
+from birthsim_env.files import finite
 from studies.comparison import stiffness as studies
 from studies.comparison.study import figures_of
 from tests.console import OWN, assert_picture, call, interrupted, strict
@@ -30,56 +32,34 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     figures = (out / "evaluation.csv").read_text().splitlines()
     assert figures[0] == "metric,unit,controller,value,q95,max"
     assert "lost episodes,of 3,backstepping-weight,0,," in figures
-    row = next(line for line in table.splitlines() if line.startswith("| settled_rms |"))
-    both = [line.split(",", 3) for line in figures if line.startswith("settled_rms,")]
-    assert [one[2] for one in both] == ["backstepping", "backstepping-weight"]
-    assert row == "| settled_rms | mm | " + " | ".join(one[3].replace(",", " | ") for one in both) + " |"
     content = strict(out / "evaluation.json")
-    law, weight = content["results"]
-    assert (law["controller"], weight["controller"]) == ("backstepping", "backstepping-weight")
-    assert law["seeds"] == weight["seeds"] == [7, 8, 9]
     assert content["arguments"]["env"] == "BirthSIM/Probe-v2"
-    assert content["rig"]["mechanics"]["mass"] == 3.0
-    for name in UNITS:
-        assert len(law["episodes"][name]) == 3
-        median = law["summary"][name]["median"]
-        if name == "settled_rms":
-            largest = law["summary"][name]["max"]
-            assert re.search(rf"\nbackstepping +{median:.3g} .* {largest:.3g} +0 of 3\n", printed), "the short table"
-        rows = [line for line in table.splitlines() if line.startswith(f"| {name} |")]
-        assert [row.split("|")[3].strip() for row in rows] == ([] if median is None else [f"{median:.3g}"]), name
-    assert weight["summary"]["settled_rms"]["median"] < law["summary"]["settled_rms"]["median"]
-    # The figures are there for the stiffness test, whose reference stands still.
-    assert math.isfinite(law["summary"]["stiffness_error"]["median"])
+    for name, result in zip(("backstepping", "backstepping-weight"), content["results"], strict=True):
+        law = make_controller(name, Parameters())
+        alone = evaluate("BirthSIM/Probe-v2", law, name, 3, 7, progress=False, randomize=True).to_dict()
+        assert (result["controller"], result["seeds"]) == (name, [7, 8, 9])
+        assert result["episodes"] == finite(alone["episodes"])
+        median, largest = (f"{result['summary']['settled_rms'][which]:.3g}" for which in ("median", "max"))
+        assert re.search(rf"\n{name} +{median} .* {largest} +0 of 3\n", printed), "the short table"
+        assert re.search(rf"\nsettled_rms,mm,{name},{median},.*,{largest}\n", "\n".join(figures))
+        assert re.search(rf"\n\| settled_rms \| .* {median} \| .* \| {largest} \|", table)
     assert_picture(out, "error_over_time")
 
 
-@pytest.mark.usefixtures("brief")
-def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp_path, monkeypatch, capsys):
-    (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 3.5\n")
-    arguments = ("--episodes", 1, "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
-    status, printed, _ = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path)
-    assert status == 0
-    assert "BirthSIM/Circle-v1, 1 episodes from seed 0, lab sensors, --randomize none" in printed
-    content = strict(tmp_path / "evaluation.json")
-    (result,) = content["results"]
-    # On the circle the reference never rests.
-    assert result["summary"]["stiffness_error"]["median"] is None
-    assert result["episodes"]["stiffness_error"] == [None]
-    assert "stiffness_error" not in (tmp_path / "evaluation.md").read_text(), "a row in which nothing is said is left out"
-    assert content["rig"]["mechanics"]["mass"] == 3.5
-
-
-def test_evaluate_takes_a_controller_from_a_file_and_survives_that_it_loses_every_episode(tmp_path, monkeypatch, capsys):
+def test_evaluate_takes_a_rig_and_a_controller_from_files_and_survives_the_loss_of_every_episode(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
-    name = f"{tmp_path}/slam.py:Slam"
-    arguments = ("--env", "BirthSIM/Probe-v2", "--episodes", 2, "--controller", name, "--out", tmp_path / "out")
-    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments)
+    (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 3.5\n")
+    world = ("--env", "BirthSIM/Probe-v2", "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
+    arguments = ("--episodes", 2, "--controller", f"{tmp_path}/slam.py:Slam", "--out", tmp_path / "out")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *world, *arguments)
     assert status == 0, complained
+    assert "BirthSIM/Probe-v2, 2 episodes from seed 0, lab sensors, --randomize none" in printed
     assert "Warning" not in complained
     assert "| lost episodes |  | 2 of 2 |" in (tmp_path / "out" / "evaluation.md").read_text()
     assert re.search(r"Slam .* 2 of 2\n", printed)
-    (result,) = strict(tmp_path / "out" / "evaluation.json")["results"]
+    content = strict(tmp_path / "out" / "evaluation.json")
+    assert content["rig"]["mechanics"]["mass"] == 3.5
+    (result,) = content["results"]
     assert result["lost"] == [True, True]
     assert result["episodes"]["stiffness_error"] == result["episodes"]["cross_motion"] == [None, None]
     assert_picture(tmp_path / "out", "error_over_time")
@@ -211,27 +191,9 @@ def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     assert [path for path in out.rglob("*") if path.is_file() and path not in (*kept, out / ".lock")] == [], "no half a file"
 
 
-def test_a_second_evaluation_does_not_compute_in_the_folder_of_the_first(tmp_path, monkeypatch, capsys):
-    with own_folder(tmp_path):
-        status, _, complained = call("evaluate", monkeypatch, capsys, "--env", "BirthSIM/Probe-v2", "--out", tmp_path)
-    assert status == 2
-    assert complained.endswith("is in use by another process; allowed: to wait for it, or another folder\n")
-    assert {path.name for path in tmp_path.iterdir()} == {".lock"}
-
-
-def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monkeypatch, capsys):
-    def interrupt(*args, **kwargs):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("agents.commands.evaluate.run_tasks", interrupt)
-    status, _, complained = call("evaluate", monkeypatch, capsys, "--out", tmp_path)
-    assert status == 130
-    assert complained == "birthsim evaluate: interrupted\n"
-
-
 def test_the_comparison_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
     own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
     case = ("--plant", "drawn-sensors", "--out", tmp_path / "out")
     status, _, complained = call("comparison", monkeypatch, capsys, *own, *case)
     assert status == 0, complained
-    assert 'BirthSIM/Probe-v2,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
+    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()

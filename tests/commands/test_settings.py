@@ -1,8 +1,6 @@
 """The settings of commands: the same by option and by TOML, and names that help lists without an import."""
 
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -22,7 +20,7 @@ from birthsim.export import FORMS
 from birthsim_env.parts.drawn.randomization import RANDOMIZE as WORDS
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.console import ROOT, assert_says, call
+from tests.console import assert_says, call
 
 EXAMPLES = {
     **{name: (one.package, one.module, one.example.split()[1:]) for name, one in COMMANDS.items()},
@@ -56,6 +54,7 @@ def test_an_example_is_read_and_says_the_same_as_toml(name, tmp_path):
         ("seed = [1, 2]", ("seed", "own.toml")),
         ("[world]\nseed = 3", ("[world][seed]", "own.toml", "birthsim run --help")),
         ("seed =", ("--config", "own.toml", "no TOML")),
+        ("env = 'BirthSIM/Nowhere-v1'", ("--env 'BirthSIM/Nowhere-v1'",)),
     ],
 )
 def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_path):
@@ -85,11 +84,3 @@ def test_choices_that_help_lists_are_those_that_there_are(monkeypatch, capsys):
         assert set(get_args(get_args(hints[option])[0])) == set(known)
     _, printed, _ = call("run", monkeypatch, capsys, "--help")
     assert [name for name in HANDS if not re.search(rf" {name}[,;]", printed)] == []
-
-
-@pytest.mark.parametrize("command", ["run", "evaluate", "train", "doctor"])
-def test_help_loads_nothing_that_is_slow(command):
-    program = "import sys; from birthsim.door import main; main(); print(*sorted(sys.modules))"
-    line = [sys.executable, "-c", program, command, "--help"]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert {"numpy", "numba", "gymnasium", "birthsim_env"} & set(done.stdout.splitlines()[-1].split()) == set()

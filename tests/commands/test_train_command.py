@@ -5,7 +5,6 @@ import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.training.checkpoint import NAME as CHECKPOINT
-from birthsim_env.files import own_folder
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
 
 
@@ -66,14 +65,6 @@ def test_train_goes_on_where_its_folder_stopped_and_refuses_the_folder_of_anothe
         status, _, complained = call("train", monkeypatch, capsys, *options, "--out", own.parent)
         assert status == 2
         assert complained.endswith(f"/seed_3' has {name} but not its {CHECKPOINT}; allowed: another folder\n")
-
-
-def test_two_processes_do_not_train_in_one_folder(small, tmp_path, monkeypatch, capsys):
-    with own_folder(tmp_path / "seed_0"):
-        status, _, complained = call("train", monkeypatch, capsys, "--config", small, "--out", tmp_path)
-    assert status == 2
-    assert complained.endswith("/seed_0' is in use by another process; allowed: to wait for it, or another folder\n")
-    assert {path.name for path in (tmp_path / "seed_0").iterdir()} <= {".lock"}
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import make_controller
+from baselines.rivals.symbolic import symbolic_model
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
@@ -27,25 +28,26 @@ NAN, INF = math.nan, math.inf
 RIG = Parameters()
 
 
-def environment(**given):
-    return gymnasium.make(CIRCLE, **given)
+def named(controller):
+    return make_controller(controller, RIG)
 
 
-def lanes(**given):
-    return gymnasium.make_vec(CIRCLE, num_envs=2, **given)
-
-
-def itself(**given):
-    """Without ``gymnasium.make``, which warns of a render mode first."""
-    return BirthSIMEnv("circle", **given)
-
-
-def lanes_themselves(**given):
-    return BirthSIMVectorEnv("circle", **given)
+environment = partial(gymnasium.make, CIRCLE)
+lanes = partial(gymnasium.make_vec, CIRCLE, num_envs=2)
+itself, lanes_themselves = partial(BirthSIMEnv, "circle"), partial(BirthSIMVectorEnv, "circle")
+"""Without ``gymnasium.make``, which warns of a render mode first."""
+residual_environment = partial(gymnasium.make, "BirthSIM/CircleResidual-v1")
+residual_lanes = partial(gymnasium.make_vec, "BirthSIM/CircleResidual-v1", num_envs=2)
+gains = partial(make_controller, "admittance[learn=false]", RIG)
+evaluation = partial(evaluate, PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False)
+linear = partial(linearize, None, (0.5, 0.0))
+limits = partial(PortLimiter, named("shut-valves"), RIG)
+score = partial(normalized_score, environment=CIRCLE, score=1.0)
+training, residual = partial(override, TrainingSettings()), partial(override, ResidualSettings())
 
 
 def ranges(**given):
-    return gymnasium.make(CIRCLE, randomize=given)
+    return environment(randomize=given)
 
 
 def options(**given):
@@ -56,48 +58,8 @@ def rig(**given):
     return RIG.replace(given)
 
 
-def named(controller):
-    return make_controller(controller, RIG)
-
-
-def gains(**given):
-    return make_controller("admittance[learn=false]", RIG, **given)
-
-
 def listed_option(controller, **given):
-    return make_controller(f"{controller}[{','.join(f'{name}={value}' for name, value in given.items())}]", RIG)
-
-
-def evaluation(**given):
-    return evaluate(PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False, **given)
-
-
-def linear(**given):
-    return linearize(None, (0.5, 0.0), **given)
-
-
-def limits(**given):
-    return PortLimiter(named("shut-valves"), RIG, **given)
-
-
-def residual_environment(**given):
-    return gymnasium.make("BirthSIM/CircleResidual-v1", **given)
-
-
-def residual_lanes(**given):
-    return gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=2, **given)
-
-
-def score(**given):
-    return normalized_score(**{"environment": CIRCLE, "score": 1.0, **given})
-
-
-def training(**given):
-    return override(TrainingSettings(), **given)
-
-
-def residual(**given):
-    return override(ResidualSettings(), **given)
+    return named(f"{controller}[{','.join(f'{name}={value}' for name, value in given.items())}]")
 
 
 def hand(kind, *fixed, **given):
@@ -154,6 +116,7 @@ TABLE = [
     (rig, "cylinder2.rod_diameter", (0.025,), "less than piston_diameter"),
     (rig, "valves.critical_ratio", (1.0,), ">= 0 and <= 0.9"),
     (rig, "valves.time_constant", (1e-5,), "(s)"),
+    (rig, "valves.opening_limit", (1.2,), "(-)"),
     (rig, "air.supply_pressure", (1e5,), "more than atmospheric_pressure"),
     (rig, "air.heat_capacity_ratio", (1,), "(-)"),
     (rig, "air.supply_conductance", (-1e-9,), "(m3/(s Pa))"),
@@ -185,7 +148,7 @@ TABLE = [
     (partial(listed_option, "shut-valves"), "gain", (3.0,), "for shut-valves: no options"),
     (partial(listed_option, "backstepping-cartesian"), "weight_compensation", (True,), "for backstepping: pneumatic_gain, "),
     (partial(listed_option, "admittance"), "learn", (2.0,), "True or False"),
-    (evaluation, "episodes", (0, -3), "a whole number >= 1"),
+    (evaluation, "episodes", (0, -3, 2.5), "a whole number >= 1"),
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
     *((kind, "parameters", (42,), "None, a Parameters, a mapping or the path") for kind in (Plant, BacksteppingController)),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),
@@ -206,16 +169,18 @@ TABLE = [
     (training, "log_std", ("low", NAN), "a finite number >= -20 and <= 2 (-)"),
     (training, "hidden", ((), (64, 0), (64.5,), (True,), 64), "1 to 8 whole numbers from 1 to 2048"),
     (training, "privileged", ("yes",), "True, False"),
+    (partial(training, algorithm="apg"), "privileged", (True,), ""),
+    (training, "target", ("wall",), "'spring', 'impedance'"),
+    (partial(training, algorithm="ppo"), "target", ("impedance",), "'spring'"),
+    (training, "beside", (3,), "ids of residual environments"),
+    (partial(training, algorithm="sac"), "beside", (("BirthSIM/ProbeResidual-v2",),), "()"),
+    (partial(training, algorithm="apg", beside=("a", "b")), "lanes", (32,), "a multiple of 3"),
+    (training, "margin", (-0.1,), ">= 0 and <= 1"),
     (training, "sensors", ("none",), "'ideal', 'lab'"),
     (training, "randomize", ("some",), "'plant', 'scenario'"),
     (training, "environment", (3,), "the id of a residual environment"),
     (residual, "smoothing", (0.3,), "law, impedance, authority, "),
     (residual, "weight_compensation", (True,), "law, impedance, authority, "),
-    (residual, "law", ("pid",), "'backstepping', "),
-    (residual, "impedance", ("soft",), "'fixed', 'variable_kp', 'variable'"),
-    (partial(residual, law="none"), "impedance", ("variable",), "'fixed', law = 'none' has no impedance to vary"),
-    (residual, "authority", (0, 501, True), "more than 0, at most 500"),
-    (residual, "time_constant", (0,), "more than 0, at most 1"),
     (Circle, "period", (0,), "other than zero"),
     (path, "length", (-0.05, (-0.05, 0.1)), ">= 0"),
     (partial(path, angle=1.0), "radius", (0.0, (-0.1, 0.1), (0.08, 0.06)), ">= 0.001"),
@@ -252,13 +217,14 @@ TABLE = [
     (BacksteppingController, "valves", ("three",), "two_valves, one_valve"),
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
+    (symbolic_model, "algebra", ("maple",), "'sympy', 'casadi'"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),
 ]  # fmt: skip
 
 
 def title(call):
     inner = call.args[0] if isinstance(call, partial) and call.args else getattr(call, "func", call)
-    return getattr(inner, "__name__", inner)
+    return getattr(inner, "__name__", inner if isinstance(inner, str) else type(inner).__name__)
 
 
 CASES = [

@@ -1,7 +1,5 @@
 """Calls that are refused in one line beyond single values: shapes, what goes with what, what nothing can serve."""
 
-import math
-
 import gymnasium
 import numpy as np
 import pytest
@@ -9,21 +7,23 @@ import pytest
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
-from baselines.backstepping.lyapunov import LyapunovFunction
+from baselines.controller import checked_command
 from baselines.identification.experiment import propose
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
 from birthsim_env.drawing.rendering import Renderer
+from birthsim_env.gradients import Recorder
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from studies.labour.model import Labour
+from studies.lyapunov import LyapunovFunction
 from studies.verification.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
-NAN, INF = math.nan, math.inf
+NAN, INF = float("nan"), float("inf")
 RIG = Parameters()
 STILL = np.zeros((4, 2)), np.zeros((2, 2))
 PHASES = {"times": (0.0, 1.0), "closed_loop": (2e3, 4e3), "pneumatic1": (4600.0, 3600.0), "pneumatic2": (2300.0, 1800.0)}
@@ -44,64 +44,56 @@ class Wrong(ForceProfile):
         return [(0.0, 1.0)]
 
 
-def env(**given):
-    return lambda: gymnasium.make(CIRCLE, **given)
+def later(function, *fixed, **always):
+    """What makes a call of a function, which is made later: ``fixed`` and ``always`` are given to each."""
+    return lambda *given, **named: lambda: function(*fixed, *given, **always, **named)
 
 
-def started(**given):
-    return lambda: gymnasium.make(CIRCLE, **given).reset(seed=0)
+def reset(*fixed, make=gymnasium.make, seed=0, **given):
+    return make(CIRCLE, *fixed, **given).reset(seed=seed)
 
 
-def lanes(**given):
-    return lambda: gymnasium.make_vec(CIRCLE, num_envs=2, **given).reset(seed=0)
-
-
-def seeded(seed):
-    return lambda: gymnasium.make_vec(CIRCLE, num_envs=3).reset(seed=seed)
-
-
-def paper(**given):
-    return lambda: BacksteppingController(RIG, **given)
-
-
-def schedule(**given):
-    return lambda: StiffnessSchedule(**given)
-
-
-def labour(**given):
-    return lambda: Labour(**given)
+env, started = later(gymnasium.make, CIRCLE), later(reset)
+lanes = later(reset, make=gymnasium.make_vec)
+paper, schedule, labour = later(BacksteppingController, RIG), later(StiffnessSchedule), later(Labour)
+residual, plant, stage = later(ResidualSettings), later(Plant), later(Stage, lambda *_: 0)
 
 
 def linear(pose=(0.5, 0.0), parameters=None, **given):
     return lambda: linearize(parameters, pose, **given)
 
 
-def residual(*given, **named):
-    return lambda: ResidualSettings(*given, **named)
-
-
-def stage(**given):
-    return lambda: Stage(lambda *_: 0, **given)
-
-
-def plant(*given, **named):
-    return lambda: Plant(*given, **named)
+def advanced(opening=STILL[0], force=STILL[1], duration=0.01):
+    return lambda: Plant(num_envs=2).advance(opening, force, duration)
 
 
 def rates(of_state, of_flows):
     return lambda: strict_feedback_rates(np.zeros((of_state, 2)), np.zeros((of_flows, 2)), RIG)
 
 
-def duration(seconds):
-    return lambda: propose(RIG, seconds)
+def pullback(changes):
+    return Plant(RIG.replace(changes)).vjp(np.zeros((4, 1)), np.zeros((2, 1)), 0.01)
+
+
+def recorder(**given):
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, **given).unwrapped
+    env.reset(seed=0)
+    return Recorder(env.simulation).prepare()
+
+
+COMMANDS = (
+    (np.zeros(4), "command() returned an array (4,)"),
+    ([[0.0] * 2] * 3, "command() returned an array (3, 2)"),
+    (None, "command() returned None"),
+    ("open", "command() returned 'open'"),
+    (np.full((4, 2), np.nan), "command()[0, 0] = nan"),
+    (np.full((4, 2), 1.5), "command()[0, 0] = 1.5"),
+)
+"""What a controller's command returns, and how it is named."""
 
 
 def streams():
     return Streams(np.array([1, 2], dtype=np.uint64), np.zeros(2, dtype=np.int64), "reference")
-
-
-def shifted(discount):
-    return lambda: ShiftedReward(None, 1.0, discount)
 
 
 TABLE = {
@@ -118,8 +110,8 @@ TABLE = {
     ("'gain'", "name[gain=60,other=2]"): [lambda: make_controller("pid[gain]", RIG)],
     ("controller = 'nobody'", "backstepping, "): [lambda: make_controller("nobody[gain=3]", RIG)],
     ("controller = 'limited:none'", ""): [lambda: make_controller("limited:none", RIG)],
-    ("duration = ", ">= 4 and <= 600 (s)"): [duration(value) for value in (0.0, 3.9, 601.0, NAN)],
-    ("discount = ", "0 or more and less than 1"): [shifted(value) for value in (-0.1, 1.0, 2.0, NAN)],
+    ("duration = ", ">= 4 and <= 600 (s)"): [later(propose, RIG)(value) for value in (0.0, 3.9, 601.0, NAN)],
+    ("discount = ", "0 or more and less than 1"): [later(ShiftedReward, None, 1.0)(value) for value in (-0.1, 1.0, 2.0, NAN)],
     ("informed = 'yes'", "True, False"): [residual(informed="yes")],
     ("range ", "a finite number or (low, high) of such"): [
         lambda bad=bad: draw(bad, np.random.default_rng(0)) for bad in ((2.0, 1.0), (1.0, 2.0, 3.0), (0.0, NAN), ("a", "b"))
@@ -188,8 +180,11 @@ TABLE = {
         ),
     ],
     ("mechanics.mas", "mass"): [env(randomize={"mechanics.mas": (2, 5)})],
+    ("policy_period = 0.01", "control period 0.004 s"): [env(parameters={"electronics": {"control_period": 0.004}})],
     ("motor", "mechanics"): [env(randomize={"motor.mass": (2, 5)})],
-    ("mass", "mechanics"): [env(randomize={"mass": (2, 5)})],
+    ("did you mean 'mechanics.mass'?", "mechanics"): [env(randomize={"mass": (2, 5)})],
+    ("did you mean 'cylinder1.stroke' or 'cylinder2.stroke'?", ""): [env(randomize={"stroke": (1, 2)})],
+    ("parameters: a = 1", "a section"): [env(parameters={"a": 1})],
     ("3", ""): [env(randomize={3: (2, 5)})],
     ("Mechanics.mass = 0.0", "> 0"): [env(randomize={"mechanics.mass": (0.0, 3.0)})],
     ("critical_ratio = 0.95", "0.9"): [env(randomize={"valves.critical_ratio": (0.2, 0.95)})],
@@ -211,11 +206,33 @@ TABLE = {
     ("supply_pressure", ""): [
         env(parameters=RIG.replace({"air.supply_pressure": 1.5e5}), randomize={"air.atmospheric_pressure": (1.0e5, 1.9e5)}),
     ],
-    ("seed", ""): [seeded(seed) for seed in ([1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc")],
+    ("mechanics.mode_frequency", "at their defaults"): [
+        later(pullback)({name: value}) for name, value in (("air.supply_conductance", 1e-8), ("mechanics.mode_frequency", 20.0))
+    ],
+    ("user's own part", ""): [later(recorder)(user_force=lambda time: (0.0, 0.0))],
+    ("valves.deadband", ""): [
+        later(pullback)({"valves.deadband": 0.1}), later(recorder)(randomize={"valves.deadband": (0.01, 0.02)}),
+    ],
+    **{
+        (f"controller 'mine': {words}", "an array (4, 2)"): [later(checked_command, "mine")(returned, 2)]
+        for returned, words in COMMANDS
+    },
+    ("seed", ""): [lanes(num_envs=3, seed=seed) for seed in ([1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc")],
     ("parameters has 3 entries", "2 lanes"): [plant(parameters=[RIG] * 3, num_envs=2)],
     ("parameters[1] = 7", "a Parameters"): [plant(parameters=[RIG, 7], num_envs=2)],
     ("state has shape (17, 2)", "(18, 2)"): [lambda: Plant(num_envs=2).derivatives(np.zeros((17, 2)), *STILL)],
     ("state[0, 0] = nan", ""): [lambda: Plant(num_envs=2).derivatives(np.full((18, 2), NAN), *STILL)],
+    ("opening_command reaches 1.5", "-1 to 1"): [advanced(STILL[0] + 1.5)],
+    ("opening_command[0, 0] = nan", "finite"): [advanced(STILL[0] * NAN)],
+    ("opening_command has shape (4,)", "(4, 2)"): [advanced(np.zeros(4))],
+    ("opening_command = 'wide'", "numbers"): [advanced("wide")],
+    ("user_force[0, 0] = inf", "finite numbers (N)"): [advanced(force=STILL[1] + INF)],
+    ("user_force has shape", "(2, 2)"): [
+        advanced(force=wrong) for wrong in ([1.0, 2.0], 5.0, np.zeros((0, 2, 2)), np.zeros((2, 3, 2, 2)))
+    ],
+    ("user_force has shape (5, 2, 3)", "(5, 2, 2)"): [advanced(force=np.zeros((5, 2, 3)))],
+    ("user_force = [[1, 2], [3]]", "numbers of shape (2, 2)"): [advanced(force=[[1, 2], [3]])],
+    ("duration = ", "a positive number, at most 3600 (s)"): [advanced(duration=wrong) for wrong in (NAN, 0, -0.01, "long")],
     ("position = (0.5, 9) m is unreachable", ""): [linear(pose=(0.5, 9.0))],
     ("pose[1] = nan", "finite numbers"): [linear(pose=(0.5, NAN))],
     ("pressures = ", "101300 to 700000 (Pa"): [linear(pressures=(1e5, 2e5, 3e5, 9e5))],
@@ -225,6 +242,7 @@ TABLE = {
     ("force has shape (1,)", "(2,)"): [linear(force=(1.0,))],
     ("frequency = 0", "above 0"): [lambda: linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])],
     ("unknown parameter 'mechanics.weight'", "mass, gravity"): [lambda: RIG.replace({"mechanics.weight": 0.9})],
+    ("'mechanics.mas' (did you mean 'mass'?)", "mass, gravity"): [lambda: RIG.replace({"mechanics.mas": 0.9})],
     ("unknown parameter section 'motor'", "geometry, cylinder1"): [lambda: RIG.replace({"motor.mass": 0.9})],
     ("Geometry.k1 = 0.43 with stroke 0.2 is impossible", ""): [lambda: RIG.replace({"geometry.d3": 0.9})],
     ("Geometry.k1 = 0.43 with stroke 0.4", ""): [
@@ -262,4 +280,4 @@ def test_a_refused_call_says_what_is_wrong_and_what_is_allowed(call, named, allo
 
 def test_gymnasium_refuses_a_negative_seed():
     with pytest.raises(gymnasium.error.Error, match="greater or equal to zero"):
-        seeded(-1)()
+        lanes(seed=-1)()

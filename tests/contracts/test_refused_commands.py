@@ -7,8 +7,19 @@ import pytest
 from tests.build.targets import need_linker
 from tests.console import OWN, RESIDUAL, assert_says, call, words
 
+TUNED = """
+class Tuned(Held):
+    TUNABLE = {"fraction": (0.0, 2.0)}
+
+class Upside(Held):
+    TUNABLE = {"fraction": (5.0, 1.0)}
+
+class Mute(Held):
+    TUNABLE = {}
+"""
 FILES = {
-    "own/mine.txt": "mine", "heavy.toml": "[mechanics]\nmass = 90.0\n", "rig.toml": "[mechanics]\nmass = -3.0\n", "own.py": OWN,
+    "own/mine.txt": "mine", "heavy.toml": "[mechanics]\nmass = 90.0\n", "rig.toml": "[mechanics]\nmass = -3.0\n",
+    "own.py": OWN + TUNED, "other.json": '{"gains": {"damping": 1.0}}', "beyond.json": '{"gains": {"fraction": 2.5}}',
 }  # fmt: skip
 """What lies in the folder where a command is called."""
 ONE_OF = "allowed: one of LOG, --propose PLAN, --simulate PLAN"
@@ -31,6 +42,9 @@ TABLE = {
     "export --to wasm --all --controller pid --out x": "--all with --controller; allowed: one of them",
     "export --to cortex-m7 --env BirthSIM/Circle-v1 --out x": "--env with cortex-m7; allowed: without it",
     "export --to wasm --parameters nowhere.toml --out x": "'nowhere.toml'",
+    "export --to ptx --gpu sm_90 --out x": "--gpu with ptx; allowed: with cubin",
+    "export --to parquet own.py --out a.csv": "a.csv'; allowed: a file that ends in .parquet",
+    "export --to mcap none.rec --out a.mcap": "none.rec' cannot be read",
     "export --to fmu --out x.zip": "--out 'x.zip'; allowed: a file that ends in .fmu",
     "export --to fmu --controller shut-valves --out x.fmu": f"controller = 'shut-valves'; {COMPILED},",
     "export --to fmu --controller pid --policy circle --out x.fmu": "--controller with --policy; allowed: one of them",
@@ -42,6 +56,7 @@ TABLE = {
     "evaluate --controller backsteping --out x": "(did you mean 'backstepping'?); allowed: a registered name",
     "evaluate --controller own.py:Mine --out x": "own.py' has no 'Mine'; allowed: a name that it defines: ",
     "evaluate --controller residual --policy none --out x": "none' holds no policy; allowed: a folder that birthsim train",
+    "evaluate --controller pid": ("--out is missing", "--help"),
     "evaluate --episodes -3 --out x": ("--episodes", f"'-3'; {NUMBER}"),
     "evaluate --episodes some --out x": ("--episodes", f"'some'; {NUMBER}"),
     "evaluate --episods 3 --out x": "--episods. Did you mean --episodes?",
@@ -76,6 +91,8 @@ TABLE = {
     "stability --points 0 --out x": ("--points", f"'0'; {NUMBER}"),
     "stability --map moon --out x": "--map",
     "stability --parameters nowhere.toml --out x": "parameters = 'nowhere.toml' cannot be read",
+    "beside-law --policy own --parameters '' --out x": "own' holds no policy",
+    "study compare": ("NAME = 'compare'; allowed: status, render, ", "comparison"),
     "figure4 --controller nobody --out x": f"controller = 'nobody'; {KNOWN}",
     "figure4 --set gain=3 --out x": "--set 'gain=3'; allowed for backstepping: weight_compensation, ",
     "figure4 --sensors perfect --out x": ("--sensors", "perfect", *MODELS),
@@ -106,6 +123,16 @@ TABLE = {
     "train --randomize some --out x": ("--randomize", *DRAWN),
     "train --parameters rig.toml --out x": MASS,
     "train --out own.py": "own.py' is a file; allowed: a folder",
+    "tune --controller backstepping --out x": "controller = 'backstepping' has no gains to tune; allowed: ",
+    "tune --controller own.py:Mute --out x": "has no gains to tune",
+    "tune --controller own.py:Upside --out x": "Upside.TUNABLE['fraction'] = (5.0, 1.0); allowed: 0 <= low < high, finite",
+    "tune --controller nobody --out x": f"controller = 'nobody'; {KNOWN}",
+    "tune --controller pid --trials 0 --out x": ("--trials", "'0'", "a whole number from 1 to 100000"),
+    "tune --controller pid --sensors none --out x": ("--sensors", "none", "ideal", "both"),
+    "tune --controller pid --start nowhere.json --out x": "nowhere.json'",
+    "tune --controller pid --start other.json --out x": "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
+    "tune --controller own.py:Tuned --start beyond.json --out x": "beyond.json' has fraction = 2.5; allowed: 0 to 2",
+    "tune --controller pid --parameters nowhere.toml --out x": "'nowhere.toml'",
     "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
     "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to fmux": "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help",

@@ -1,5 +1,7 @@
 """Files of a user's own that are refused: one line that names what is wrong and what is allowed."""
 
+from pathlib import Path
+
 import gymnasium
 import pytest
 
@@ -9,6 +11,7 @@ from baselines.logs.table import read_table
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.own_parts import stiffness_of
+from birthsim_live.logs.reading import read_log
 
 CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()
@@ -28,6 +31,7 @@ READERS = {
     "training": load_configuration,
     "plan": lambda path: read_plan(path, RIG),
     "log": read_table,
+    "recorded": lambda path: read_log(Path(path)),
 }
 
 PYTHON = """
@@ -101,6 +105,21 @@ TABLE = {
         (PYTHON, ":Needs", "user_force: Needs() fails (TypeError: ", "'size'); allowed: a birthsim_env.UserForce"),
         (PYTHON, ":number", "user_force = 3; allowed: None, a birthsim_env.UserForce, 'steps', 'sine'"),
     ],
+    ("user_force", "push.csv"): [
+        (text, names, "user_force = ", said, "allowed: ")
+        for text, names, said in (
+            ("time_ms,Fx,Fy\n0,1,2\n1,1,2\n", "", "'time'"),
+            ("time (ms),Fx,Fy\n0,1,2\n1,1,2\n", "", "'time' in ms, not in s"),
+            ("time,Fx [kN],Fy\n0,1,2\n1,1,2\n", "", "'Fx' in kN, not in N"),
+            ("time,Fx,Fx,Fy\n0,1,2,3\n1,1,2,3\n", "", "'Fx' 2 times"),
+            ("time;Fx;Fy\n0;1;2\n1;1;2\n", "", "separated by commas"),
+            ("t,a,b\n0,1,2\n1,1,2\n", ":t,a", "one for each of"),
+            ("t,a,b\n0,1,2\n1,1,2\n", ":t,a,d", "'d' 0 times"),
+            ("0,1,2\n1,1,2\n", ":t,a,b", "t, a, b"),
+            ("time,Fx,Fy\n0,1,2\n1,1\n", "", "line 3"),
+            ("Fx,time,Fy\n0,1,2\n1,0.5,2\n", "", "line 3"),
+        )
+    ],
     ("user_force", "soft"): [(None, "", "soft'; allowed: a birthsim_env.UserForce, 'steps', 'sine', 'noise', 'guided'")],
     ("stiffness", "own.csv"): [
         (text, "", "stiffness") for text in ("0,0.5,0\n1,0.5,0\n", "0,0.5,0,2000\n1,0.5,0\n", "0,0.5,0,-1\n1,0.5,0,2000\n")
@@ -149,6 +168,15 @@ TABLE = {
         ("time,a\n0,1\n1\n", "", "line 3: '1'; allowed: 2 numbers, for time, a"),
         ("time,a,a\n0,1,2\n", "", "has two columns 'a'; allowed: one of each name"),
         ("time,a\n" + "1," * 2**20, "", "log.csv'", " allowed: at most 1048576"),
+    ],
+    ("recorded", "bad.rec"): [
+        (None, "", "bad.rec' cannot be read"),
+        ("{", "", "bad.rec' is damaged or foreign (no chunk is whole)"),
+    ],
+    ("recorded", "bad.json"): [
+        (None, "", "bad.json' cannot be read"),
+        ("{", "", "bad.json' is damaged or foreign (JSONDecodeError"),
+        ("[1]", "", "bad.json' is damaged or foreign (TypeError"),
     ],
     ("log", "log.parquet"): [(b"PAR1 but not", "", "is no Parquet (")],
     ("log", "log.mcap"): [(b"neither", "", "cannot be read as MCAP (")],

@@ -8,7 +8,6 @@ from baselines.bench.resting import RestingRigs
 from baselines.registry import make_controller
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.physics.rig.parameters import load_parameters
-from studies.haptics.release import measure_release
 from tests.controllers.test_admittance_adaptive import openings
 
 RIG = load_parameters("examples/acceleration_sensor_rig.toml")
@@ -79,21 +78,3 @@ def test_without_a_force_sensor_a_strong_pull_is_held(hertz, most, pull):
     assert loop.impacts.max() == 0.0
     path = loop.path(500).mean(axis=0)
     np.testing.assert_allclose(1e3 * path[0], 450.0 + pull / 4.0, atol=most)
-
-
-@pytest.mark.slow
-def test_a_pull_that_is_let_go_overshoots_less():
-    settings = {
-        "controller": "admittance-adaptive",
-        "source": "",
-        "sensors": "honest",
-        "seed": 0,
-        "rigs": 3,
-        "force_sensor": True,
-    }
-    has, plain = (
-        measure_release(rig=RIG.replace({"electronics.acceleration_bandwidth": hertz}).to_dict(), **settings)
-        for hertz in (300.0, 0.0)
-    )
-    assert np.median(has["overshoot_mm"]) < 0.5 * np.median(plain["overshoot_mm"])
-    assert np.median(has["speed"]) < np.median(plain["speed"])

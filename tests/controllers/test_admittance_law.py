@@ -1,14 +1,12 @@
 """Pieces of the admittance law, with the figures that its constants stand for."""
 
-import math
-
 import numpy as np
 import pytest
 
 from baselines.admittance import law
 from baselines.admittance.rows import HalfWave
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.controllers.test_admittance_backstepping import PERIOD, Law, near, remembered
+from tests.controllers.test_admittance_backstepping import PERIOD, Law, near
 from tests.oracles import derived_law as derived
 from tests.oracles import rigid_body
 
@@ -64,16 +62,6 @@ def test_half_waves_count_where_they_go_beyond_the_level_within_a_fifth_of_a_sec
     assert ended([1.0, 0.91], 0.05, level=0.9) == pytest.approx([0.0, 0.91])
     assert ended([0.1, 0.1, 0.1], 0.19) == pytest.approx([0.0, 0.1, 0.1])
     assert ended([0.1, 0.1, 0.1], 0.21) == [0.0, 0.0, 0.0]
-
-
-def test_the_gain_of_motion_fades_with_a_tenth_of_a_second() -> None:
-    rig = Parameters()
-    now, nothing, memory = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0), np.zeros((2, 1)), remembered(1)
-    motion, _ = near(now, rig, nothing, seed=1, fraction=0.0)
-    Law(rig).command(now, motion, nothing, nothing, moving=1.0, memory=memory)
-    for _ in range(100):
-        Law(rig).command(now, motion, nothing, nothing, moving=0.0, memory=memory)
-    assert memory.follower.moved[0] == pytest.approx(math.exp(-1.0), rel=1e-6)
 
 
 def test_position_errors_count_up_to_six_millimetres() -> None:

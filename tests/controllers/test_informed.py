@@ -9,7 +9,6 @@ import pytest
 from baselines.admittance import knowledge
 from baselines.admittance.knowledge import BELIEVED_LIMIT
 from baselines.admittance.rows import Known, Memory
-from baselines.controller import require_stiffness
 from baselines.estimation.admittance import MOVING_SPEED
 from baselines.rivals.horizon import NODES, Horizon, Situation
 from baselines.rivals.predictive import GENERATED as GENERATED
@@ -19,9 +18,8 @@ from birthsim_env.loop.rows import HANDED, Seen
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.loop.stage import block
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_array
+from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop, rigid_body
 
@@ -48,7 +46,7 @@ def inform(world: int, seen: Seen, memory: int, about: Constants, tables: int, l
 
 
 class Aware(StagedController):
-    """What a planner knows, by its names, which are good until the next ``update``; gains for ``ideal`` and ``lab`` sensors."""
+    """What a planner knows, by its names, which are good until the next ``now``; gains for ``ideal`` and ``lab`` sensors."""
 
     def __init__(self, rig: Parameters, gains: dict[str, dict[str, float]], horizon: Horizon = EVERY_PERIOD) -> None:
         super().__init__(rig)
@@ -64,13 +62,6 @@ class Aware(StagedController):
         self.known = Known(np.zeros((Known.size, lanes)))
         return [(self.known.rows, HANDED)]
 
-    def explain(self, measurement: Measurement, reference: Reference) -> None:
-        require_stiffness(reference, 0.0)
-
-    def update(self, measurement: Measurement, reference: Reference) -> None:
-        if self.run_stages(measurement, reference):
-            self.explain(measurement, reference)
-
     @property
     def memory(self) -> Memory:
         return Memory(self._memories[0])
@@ -84,7 +75,7 @@ class Aware(StagedController):
         return given
 
     def now(self, measurement: Measurement, reference: Reference) -> SimpleNamespace:
-        self.update(measurement, reference)
+        assert not self.run_stages(measurement, reference)
         given, memory = self.known.given, self.memory
         return SimpleNamespace(
             motion=self.known.motion.rows, moving=given.moving, force=given.force, believed=given.believed,
@@ -204,38 +195,6 @@ def test_what_is_slower_than_the_moving_speed_may_rest(sampled: bool) -> None:
     assert now.moving.tolist() == [0, 1, 0, 1, 1]
 
 
-@either
-def test_spools_are_those_of_the_plant(sampled: bool) -> None:
-    """``commanded`` is all that is known of them; before the first command they are shut."""
-    plant, part, rng = Plant(RIG, 2), aware(), np.random.default_rng(3)
-    plant.state = balanced_state(plant.lane_parameters, PISTON)
-    wanted, nothing = closed_loop.holding(end_effector(PISTON), 2000.0), np.zeros((2, 2))
-    for tick in range(40):
-        exact = closed_loop.ideal(plant, tick * PERIOD, nothing)
-        now = part.now(dataclasses.replace(exact, sampled=sampled), wanted)
-        np.testing.assert_allclose(now.spools, plant.state[list(SPOOLS)], rtol=0, atol=2e-6)
-        openings = rng.uniform(-1, 1, (4, 2))
-        part.commanded(openings)
-        plant.advance(openings, nothing, PERIOD)
-        openings[:] = np.nan
-    assert np.abs(now.spools).max() > 0.1
-
-
-def test_noise_is_averaged_where_cells_are_noisy_and_nowhere_else() -> None:
-    """Shut valves, resting pistons: exact cells are believed bit for bit, noisy ones with the noise of a first-order filter."""
-    lanes, noise, rng = 400, 500.0, np.random.default_rng(2)
-    piston, nothing = np.repeat(PISTON[:, :1], lanes, axis=1), np.zeros((2, lanes))
-    pressures, wanted = balanced(piston), closed_loop.holding(end_effector(piston), 2000.0)
-    exact, averaging = aware(), aware()
-    for tick in range(80):
-        cells = pressures + noise * rng.normal(size=pressures.shape)
-        known = exact.now(seen(tick, piston, cells, nothing, False), wanted)
-        assert np.array_equal(known.pressures, cells)
-        now = averaging.now(seen(tick, piston, cells, nothing, True), wanted)
-    fraction = 1 - np.exp(-GAINS["pressure_bandwidth"] * PERIOD)
-    assert np.std(now.pressures - pressures) == pytest.approx(noise * np.sqrt(fraction / (2 - fraction)), rel=0.1)
-
-
 def test_the_observer_of_disturbances_takes_the_pressures_that_are_believed() -> None:
     """Cells that are not believed once they have been read, for want of bandwidth, change nothing; otherwise they do."""
     rng, nothing = np.random.default_rng(2), np.zeros((2, 2))
@@ -250,15 +209,6 @@ def test_the_observer_of_disturbances_takes_the_pressures_that_are_believed() ->
             found[bandwidth, scale] = now.disturbance.copy()
     np.testing.assert_allclose(found[1e-9, 1.0], found[1e-9, 0.0], rtol=0, atol=1e-6)
     assert np.abs(found[150.0, 1.0] - found[150.0, 0.0]).min() > 1e-4
-
-
-@either
-def test_springs_that_are_none_are_refused(sampled: bool) -> None:
-    wanted = closed_loop.holding(end_effector(PISTON), 2000.0)
-    measured = seen(0, PISTON, balanced(PISTON), np.zeros((2, 2)), sampled)
-    wanted.rows[14, 1] = -2500.0
-    with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 1; allowed: more than 0 N/m in every direction"):
-        aware().update(measured, wanted)
 
 
 def test_unseen_forces_are_friction_and_what_was_observed_up_to_a_limit() -> None:

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import checked_command
 from baselines.registry import SHORT_NAMES, controller_names, make_controller, resolved
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
@@ -69,12 +68,14 @@ def test_two_files_of_one_name_are_two_controllers(tmp_path):
     assert numpy is np
 
 
-def test_the_named_controllers_are_the_law_with_and_without_weight():
+def test_short_names_of_the_papers_law_have_their_options():
     assert {"backstepping", "admittance", "residual"} <= set(controller_names())
     env = gymnasium.make_vec(CIRCLE, num_envs=2)
     env.reset(seed=0)
-    for name, weight in (("backstepping", False), ("backstepping-weight", True)):
-        expected = BacksteppingController(RIG, weight_compensation=weight).command(env.measurement, env.reference)
+    weight = {"weight_compensation": True}
+    names = {"backstepping": {}, "backstepping-weight": weight, "backstepping-frozen": {**weight, "frozen_friction": True}}
+    for name, options in names.items():
+        expected = BacksteppingController(RIG, **options).command(env.measurement, env.reference)
         np.testing.assert_array_equal(make_controller(name, RIG).command(env.measurement, env.reference), expected)
 
 
@@ -87,20 +88,3 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
         assert one.function is other.function
         np.testing.assert_array_equal(one.constants, other.constants)
-
-
-@pytest.mark.parametrize(
-    ("returned", "words"),
-    [
-        (np.zeros(4), r"returned an array \(4,\)"),
-        ([[0.0] * 2] * 3, r"returned an array \(3, 2\)"),
-        (None, "returned None"),
-        ("open", "returned 'open'"),
-        (np.full((4, 2), np.nan), r"command\(\)\[0, 0\] = nan"),
-        (np.full((4, 2), 1.5), r"command\(\)\[0, 0\] = 1\.5"),
-    ],
-)
-def test_a_command_that_is_none_is_refused_by_name(returned, words):
-    with pytest.raises(ValueError, match=rf"controller 'mine': .*{words}; allowed: spool openings .* an array \(4, 2\)"):
-        checked_command("mine", returned, 2)
-    assert checked_command("mine", [[0.0, 1.0]] * 4, 2).shape == (4, 2)

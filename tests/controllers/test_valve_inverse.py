@@ -64,3 +64,12 @@ def test_a_valve_without_driving_pressure_stays_shut() -> None:
     """Above the supply nothing can fill, below the atmosphere nothing can drain: opening would do the contrary."""
     pressures = np.full((4, 2), [8e5, 0.9e5])
     assert not openings_for_flows(np.full((4, 2), [1e-3, -1e-3]), pressures, RIG).any()
+
+
+def test_no_chamber_counts_as_shorter_than_two_millimetres() -> None:
+    p = Rig(parameter_column(RIG))
+    for k, half in enumerate((p.half_l1, p.half_l2)):
+        beyond = ((0.03, half + 0.03, half - 0.03), (half - 0.0015, 2 * half - 0.0015, 0.002), (-2 * half, 0.002, 3 * half))
+        for y, length_p, length_n in beyond:
+            air = valve_inverse.air_at(k, 3e5, 3e5, y, 0.0, p)
+            assert (air.length_p, air.length_n) == pytest.approx((length_p, length_n))

@@ -48,17 +48,9 @@ def test_a_lane_waits_for_its_reset_where_autoreset_is_disabled():
     env.step(SLAM)
 
 
-def test_reset_and_step_say_the_same_things():
-    single, lanes = gymnasium.make(PROBE), make()
-    assert single.reset(seed=0)[1].keys() == single.step(np.zeros(4))[4].keys()
-    assert lanes.reset(seed=0)[1].keys() == lanes.step(0 * SLAM)[4].keys()
-
-
-def test_rounding_in_single_precision_is_no_error_and_the_frame_rate_is_whole():
-    env = gymnasium.make(PROBE, policy_period=0.03)
+def test_rounding_in_single_precision_is_no_error():
+    env = gymnasium.make(PROBE)
     env.reset(seed=0)
     env.step(np.full(4, np.nextafter(np.float32(1), np.float32(2)), np.float32))
     with pytest.raises(ValueError, match=r"action\[0\] = 1\.0001"):
         env.step(np.array([1.0001, 0, 0, 0]))
-    assert env.metadata["render_fps"] == 33
-    assert isinstance(env.metadata["render_fps"], int)

@@ -3,23 +3,16 @@
 import math
 import re
 
-import gymnasium
 import numpy as np
 import pytest
 
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.reward import REWARD_TERMS
+from tests.env.test_env_api import IDS, make, random_actions
 from tests.oracles import linkage_by_points as by_points
-
-IDS = tuple(map(environment_id, SCENARIOS))
-
-
-def make(name=IDS[0], **arguments) -> BirthSIMEnv:
-    return gymnasium.make(name, **arguments).unwrapped
 
 
 def run(env, actions, seed=0):
@@ -31,10 +24,6 @@ def run(env, actions, seed=0):
         rows.append((observation, reward, info))
     observations, rewards, infos = zip(*rows, strict=True)
     return np.array(observations), np.array(rewards), infos
-
-
-def random_actions(count, size, reach=0.2, seed=0):
-    return np.random.default_rng(seed).uniform(-reach, reach, (count, size)).astype(np.float32)
 
 
 def test_the_table_in_the_docstring_is_the_table_of_entries():

@@ -11,11 +11,9 @@ from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.plant import Plant
 from studies.haptics.worlds import no_hand, resting
 from studies.stability.rig_port import RigPort
-from tests.env.test_loop import OwnValves, assert_same, course
+from tests.env.test_loop import OwnValves, assert_same, course, own
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 OFF = {
@@ -31,13 +29,6 @@ def test_with_every_error_off_a_run_is_labs_to_the_last_bit(name):
     assert_same(*(course(gymnasium.make_vec(name, num_envs=3, sensors=kind, parameters=rig)) for kind in ("honest", "lab")))
 
 
-class OwnHonest(HonestSensors):
-    """Asked in Python."""
-
-    def measure(self, *seen):
-        return super().measure(*seen)
-
-
 class AskedForAll:
     """Sensors whose measurements and control board are asked in Python."""
 
@@ -48,12 +39,12 @@ class AskedForAll:
         self.begin, self.measure, self.put_out, self.vary = honest.begin, honest.measure, honest.put_out, honest.vary
 
 
-@pytest.mark.parametrize("own", [OwnHonest, AskedForAll, "actuation"])
-def test_a_stop_for_python_changes_no_bit(own, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", own)
+@pytest.mark.parametrize("part", [own(HonestSensors, "measure"), AskedForAll, "actuation"])
+def test_a_stop_for_python_changes_no_bit(part, monkeypatch):
+    monkeypatch.setitem(SENSORS, "own", part)
     rig = Parameters().replace({"electronics.missed_periods": 0.2})
     setting = {"num_envs": 3, "parameters": rig, "randomize": True}
-    changes = {"sensors": "own"} if own != "actuation" else {"actuation": OwnValves("two_valves"), "sensors": "honest"}
+    changes = {"sensors": "own"} if part != "actuation" else {"actuation": OwnValves("two_valves"), "sensors": "honest"}
     one, other = (gymnasium.make_vec(CIRCLE, **{**setting, **more}) for more in ({"sensors": "honest"}, changes))
     assert_same(course(one), course(other))
 
@@ -122,19 +113,6 @@ def test_a_clock_that_jitters_puts_out_the_mean_of_both_openings_over_the_period
     assert apart < 1.95 / np.sqrt(fractions.size)
 
 
-@pytest.mark.parametrize("late", [0.0, 0.25, 0.5, 1.0])
-def test_the_mean_moves_a_spool_as_an_opening_that_comes_late(late):
-    rig = Parameters()
-    period, lag = rig.electronics.control_period, rig.valves.time_constant
-    exact, mean = Plant(rig), Plant(rig)
-    for opening, seconds in ((0.0, late * period), (0.8, (1 - late) * period)):
-        if seconds:
-            exact.advance(np.full((4, 1), opening), np.zeros((2, 1)), seconds)
-    mean.advance(np.full((4, 1), 0.8 * (1 - late)), np.zeros((2, 1)), period)
-    spools = list(at.SPOOLS)
-    assert np.abs(exact.state[spools] - mean.state[spools]).max() <= 0.8 * (period / lag) ** 2 / 8 + 1e-8
-
-
 def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
     envs = {kind: gymnasium.make_vec(CIRCLE, num_envs=50, sensors=kind, randomize=True) for kind in ("ideal", "lab", "honest")}
     for env in envs.values():
@@ -150,14 +128,6 @@ def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
     envs["honest"].reset(seed=6)
     again = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)]
     np.testing.assert_array_equal(again[:, :-1], drawn[:, 1:])
-
-
-def test_a_nominal_rig_has_nominal_sensors_whose_errors_differ_by_episode():
-    env = gymnasium.make_vec(CIRCLE, num_envs=4, sensors="honest", randomize="scenario")
-    env.reset(seed=5)
-    errors = env.unwrapped.simulation.sensors._errors
-    np.testing.assert_array_equal(errors[: len(FIGURES)], np.broadcast_to(errors[: len(FIGURES), :1], (len(FIGURES), 4)))
-    assert len(np.unique(errors[len(FIGURES)])) == 4
 
 
 def test_drawn_sensors_meet_the_nominal_rig_and_have_the_errors_of_rigs_and_sensors_drawn():
@@ -176,13 +146,6 @@ def test_drawn_sensors_meet_the_nominal_rig_and_have_the_errors_of_rigs_and_sens
     assert described(Parameters(), "sensors", "honest").startswith("sensors drawn: position noise 5e-05 to 0.0003 m, ")
 
 
-def test_sensors_are_drawn_only_where_the_model_can():
-    ranges = {"electronics.force_bias": (0.0, 5.0)}
-    gymnasium.make(CIRCLE, sensors="honest", randomize=ranges).reset(seed=0)
-    assert "force bias 0 to 2 N" in described(Parameters(), True, "honest")
-    assert "force bias" not in described(Parameters(), True)
-
-
 def test_a_laboratorys_own_figures_and_ranges_come_from_its_file(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text('[electronics]\nforce_noise = 0.0\nforce_bias = 3.0\n[randomize]\n"electronics.adc_bits" = [9, 10]\n')
@@ -199,25 +162,3 @@ def test_a_laboratorys_own_figures_and_ranges_come_from_its_file(tmp_path):
     assert "pressure_range" in path.read_text(), "a file names every figure"
     assert rig.to_dict()["electronics"].keys() >= {"force_noise", "force_bias", "position_noise"}
     assert "pressure_range" not in rig.to_dict()["electronics"]
-
-
-def test_what_a_law_believes_of_the_sensors_may_differ_from_what_they_are():
-    """The environment has its ``Parameters``, the law its own: sensors with five times the noise that it is told of."""
-    true = Parameters().replace({"electronics.position_noise": 5e-4})
-
-    def run(believed):
-        env = gymnasium.make_vec(
-            "BirthSIM/Probe-v2", num_envs=2, sensors="honest", parameters=true, policy_period=0.001, duration=2.0
-        )
-        env.reset(seed=0)
-        law = make_controller("admittance-backstepping", believed)
-        law.reset()
-        openings = []
-        for _ in range(600):
-            openings.append(law.command(env.unwrapped.measurement, env.unwrapped.reference))
-            env.step(openings[-1].T)
-        return np.array(openings)
-
-    informed, mistaken = run(true), run(Parameters())
-    assert np.isfinite(mistaken).all()
-    assert np.abs(informed - mistaken).max() > 1e-3

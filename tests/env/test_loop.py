@@ -39,32 +39,18 @@ def assert_same(one, other):
         np.testing.assert_array_equal(a, b)
 
 
-class OwnCircle(Circle):
-    """The same circle, asked in Python."""
-
-    def sample(self, time):
-        return super().sample(time)
-
-
-class OwnSteps(AlternatingSteps):
-    def force(self, time, position, velocity):
-        return super().force(time, position, velocity)
-
-
-class OwnSchedule(StiffnessSchedule):
-    def sample(self, time):
-        return super().sample(time)
-
-
 class OwnValves(ValveActuation):
     """Without stages the loop stops for it."""
 
     stages = None
 
 
-class OwnSensors(IdealSensors):
-    def measure(self, *seen):
-        return super().measure(*seen)
+def own(part, method):
+    """A class that does what ``part`` does, asked in Python since its ``method`` is another."""
+    return type(f"Own{part.__name__}", (part,), {method: lambda self, *asked: getattr(part, method)(self, *asked)})
+
+
+OwnCircle, OwnSchedule = own(Circle, "sample"), own(StiffnessSchedule, "sample")
 
 
 def schedule(kind=StiffnessSchedule):
@@ -72,21 +58,21 @@ def schedule(kind=StiffnessSchedule):
 
 
 @pytest.mark.parametrize(
-    "own",
+    "changed",
     [
         {"reference": OwnCircle()},
-        {"user_force": OwnSteps(repeats=1)},
+        {"user_force": own(AlternatingSteps, "force")(repeats=1)},
         {"stiffness": schedule(OwnSchedule)},
         {"actuation": OwnValves("two_valves")},
         {"sensors": "own"},
         {"reference": OwnCircle(), "stiffness": schedule(OwnSchedule), "actuation": OwnValves("two_valves")},
     ],
-    ids=lambda own: "+".join(own),
+    ids="+".join,
 )
-def test_a_stop_for_a_users_python_changes_no_bit(own, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", OwnSensors)
+def test_a_stop_for_a_users_python_changes_no_bit(changed, monkeypatch):
+    monkeypatch.setitem(SENSORS, "own", own(IdealSensors, "measure"))
     compiled = {"reference": Circle(), "user_force": AlternatingSteps(repeats=1), "stiffness": schedule()}
-    one, other = (gymnasium.make_vec(CIRCLE, num_envs=3, **arguments) for arguments in (compiled, {**compiled, **own}))
+    one, other = (gymnasium.make_vec(CIRCLE, num_envs=3, **arguments) for arguments in (compiled, {**compiled, **changed}))
     assert_same(course(one), course(other))
     pieces = [len(env.unwrapped.simulation._loop._pieces) for env in (one, other)]
     assert pieces[0] == 1 < pieces[1], "what is compiled is one piece; a user's part stands between others"

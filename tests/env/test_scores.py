@@ -14,8 +14,8 @@ from birthsim_env.loop.rows import World
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.reward import Tally, add
 from birthsim_env.scores import ROLES, normalized_score, reference_scores
-from birthsim_env.success import Tally, add
 
 IDS = [environment_id(name) for name in SCENARIOS]
 PROBE = environment_id("probe")

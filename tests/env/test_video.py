@@ -6,7 +6,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.wrappers import RecordVideo
-from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 from imageio_ffmpeg import read_frames
 
 import birthsim_env
@@ -49,25 +48,13 @@ def test_record_video_writes_what_was_drawn_at_the_rate_of_the_environment(tmp_p
         assert np.abs(frames.astype(float) - wanted[::-1]).mean() > 1.1 * np.abs(frames.astype(float) - wanted).mean()
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*autoreset mode is same-step:UserWarning")
-def test_several_environments_are_recorded_side_by_side(tmp_path):
-    envs = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, render_mode="rgb_array", policy_period=0.02, picture_size=SIZE)
-    recorder = RecordVectorVideo(envs, str(tmp_path / "videos"), video_length=4, video_aspect_ratio=(3, 1))
-    recorder.reset(seed=0)
-    for _ in range(5):
-        recorder.step(np.zeros((3, 4), dtype=np.float32))
-    recorder.close()
-    (path,) = (tmp_path / "videos").iterdir()
-    recorded, rate = frames_of(path)
-    assert (recorded.shape[1:], rate) == ((SIZE[1], 3 * SIZE[0], 3), 50)
-
-
-@pytest.mark.parametrize("period", [0.001, 0.01, 0.04])
-def test_a_recording_plays_in_real_time(period):
+@pytest.mark.parametrize(("period", "rate"), [(0.001, 1000), (0.01, 100), (0.03, 33), (0.04, 25)])
+def test_a_recording_plays_in_real_time_at_a_whole_rate(period, rate):
     single = gymnasium.make("BirthSIM/Circle-v1", policy_period=period)
     several = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=period)
-    assert single.metadata["render_fps"] == several.metadata["render_fps"] == 1 / period
+    for env in (single, several):
+        assert env.metadata["render_fps"] == rate
+        assert isinstance(env.metadata["render_fps"], int)
 
 
 def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(monkeypatch):

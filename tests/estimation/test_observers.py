@@ -1,6 +1,5 @@
 """The observer of piston speeds: poles, bias and delay on made-up samples, errors on a rig that a tracker watches."""
 
-import dataclasses
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -10,6 +9,7 @@ from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import linkage_by_points as by_points
@@ -75,23 +75,16 @@ def test_constant_speed_is_found_without_bias(rate: float, latency: float) -> No
             np.testing.assert_allclose(estimate[2:, 0], [0, 0.05], rtol=0, atol=1e-7)
 
 
-def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], Reference]:
-    """50 mm in 4 s."""
-    return lambda time: closed_loop.circling(time, 0.05, 4.0, stiffness, lanes)
+def watched(rig: Parameters, lanes: int, seconds: float) -> Iterator[tuple[float, Plant, Measurement]]:
+    """Time, a rig that goes 50 mm about in 4 s under exact measurements, and the tracker's view of it."""
 
+    def reference(time: float) -> Reference:
+        return closed_loop.circling(time, 0.05, 4.0, 2000.0, lanes)
 
-def watched(rig: Parameters, lanes: int, seconds: float) -> dict[str, Array]:
-    """A rig on the circle under exact measurements, while an observer watches through the tracker: (T, 2, N) after 1 s."""
-    reference, estimator, sense = circle(lanes), Sampled(rig), closed_loop.tracker(rig, lanes)
-    plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
-    speed, piston_error, speed_error = [], [], []
+    plant, sense = closed_loop.resting_at(reference(0.0), rig), closed_loop.tracker(rig, lanes)
+    law = BacksteppingController(rig, weight_compensation=True)
     for time, _, push, _ in closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds):
-        estimate = estimator.update(sense(plant, time, push))
-        if time > 1:
-            speed.append(plant.piston_speed)
-            piston_error.append(estimate[:2] - plant.piston)
-            speed_error.append(estimate[2:] - plant.piston_speed)
-    return {"speed": np.array(speed), "piston error": np.array(piston_error), "speed error": np.array(speed_error)}
+        yield time, plant, sense(plant, time, push)
 
 
 def rms(values: Array) -> Array:
@@ -112,38 +105,21 @@ def test_position_and_speed_of_a_moving_rig(rig: Parameters, position: tuple[flo
     Measured: 0.039 and 0.094 mm, 2.2 and 5.2 mm/s without friction; 0.043 and 0.166 mm, 3.5 and 19 mm/s with LuGre friction,
     which the observer does not know and finds anew at every reversal.
     """
-    seen = watched(rig, 8, 5.0)
-    assert np.all(rms(seen["piston error"]) < position)
-    assert np.all(rms(seen["speed error"]) < speed)
-    assert np.abs(seen["piston error"].mean(axis=(0, 2))).max() < 1e-5, "no offset"
-
-
-@pytest.mark.parametrize(
-    ("rate", "latency"),
-    [*(pytest.param(240.0, late, marks=pytest.mark.slow) for late in (0.0, 0.05)), (240.0, 0.004), (60.0, 0.004)],
-)
-def test_the_trackers_delay_is_made_up_for(rate: float, latency: float) -> None:
-    """Without noise: the time by which the estimate trails the motion, fitted by least squares over the circle."""
-    changes = {"position_rate": rate, "position_latency": latency, "position_noise": 0.0, "pressure_noise": 0.0}
-    rig = closed_loop.FRICTIONLESS.replace({f"electronics.{name}": value for name, value in changes.items()})
-    seen = watched(rig, 1, 3.0)
-    trail = -(seen["piston error"] * seen["speed"]).sum(axis=(0, 2)) / (seen["speed"] ** 2).sum(axis=(0, 2))
-    assert np.abs(trail).max() < 2e-5, "s"
-    assert rms(seen["piston error"]).max() < 1e-4
-
-
-def recorded(lanes: int, seconds: float) -> list[Measurement]:
-    """Measurements of a rig on the circle through the tracker."""
-    rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), closed_loop.tracker(closed_loop.FRICTIONLESS, lanes)
-    plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
-    path = closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds)
-    return [sense(plant, time, push) for time, _, push, _ in path]
+    estimator, errors = Sampled(rig), []
+    for time, plant, measured in watched(rig, 8, 5.0):
+        estimate = estimator.update(measured)
+        if time > 1:
+            errors.append(estimate - np.concatenate([plant.piston, plant.piston_speed]))
+    error = np.array(errors)
+    assert np.all(rms(error[:, :2]) < position)
+    assert np.all(rms(error[:, 2:]) < speed)
+    assert np.abs(error[:, :2].mean(axis=(0, 2))).max() < 1e-5, "no offset"
 
 
 def test_an_observer_starts_from_what_the_tracker_shows() -> None:
     """Position and speed; 0.6 s later nothing is left of when it began."""
     kept, late = Sampled(closed_loop.FRICTIONLESS), Sampled(closed_loop.FRICTIONLESS)
-    for tick, measured in enumerate(recorded(1, 1.2)):
+    for tick, (_, _, measured) in enumerate(watched(closed_loop.FRICTIONLESS, 1, 1.2)):
         expected = kept.update(measured).copy()
         if tick >= 600:
             got = late.update(measured).copy()
@@ -152,57 +128,3 @@ def test_an_observer_starts_from_what_the_tracker_shows() -> None:
             np.testing.assert_allclose(got[2:, 0], shown, rtol=1e-9)
             assert np.abs(expected[2:]).max() > 0.01
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6)
-
-
-class Differences:
-    """The law with the tracker's positions and low-passed differences as they are, without an observer."""
-
-    def __init__(self, law: BacksteppingController) -> None:
-        self.law = law
-
-    def command(self, measured: Measurement, reference: Reference) -> Array:
-        return self.law.command(dataclasses.replace(measured, sampled=False), reference)
-
-
-def on_the_circle(
-    rig: Parameters, setpoints: tuple[float, ...], observed: bool, seconds: float = 5.0
-) -> tuple[Array, Array, Array]:
-    """Errors of the end effector after 1 s with M setpoints: RMS and maximum on both axes, (2, M), m; and the fraction of time
-    with a saturated valve, (M,)."""
-    each, lanes = 8, 8 * len(setpoints)
-    reference, law = circle(lanes, np.repeat(setpoints, each)), BacksteppingController(rig, weight_compensation=True)
-    plant, errors, full = closed_loop.resting_at(reference(0.0), rig), [], []
-    command = law.command if observed else Differences(law).command
-    path = closed_loop.run(plant, command, reference, lambda t: np.zeros((2, lanes)), seconds, closed_loop.tracker(rig, lanes))
-    for time, wanted, _, openings in path:
-        if time > 1:
-            errors.append(plant.end_effector()[:2] - wanted.position)
-            full.append(np.abs(openings) >= 1)
-    assert np.isfinite(errors).all()
-    error = np.reshape(errors, (-1, 2, len(setpoints), each))
-    saturated = np.reshape(full, (-1, 4, len(setpoints), each)).mean(axis=(0, 1, 3))
-    return np.sqrt((error**2).mean(axis=(0, 3))), np.abs(error).max(axis=(0, 3)), saturated
-
-
-@pytest.mark.parametrize(
-    ("rig", "setpoints", "typical", "most"),
-    [
-        (closed_loop.FRICTIONLESS, (1000.0, 2000.0, 4000.0), (1e-4, 1e-4, 1e-4), (4e-4, 4e-4, 5e-4)),
-        (Parameters(), (2000.0, 4000.0), (9e-4, 6e-4), (5e-3, 4e-3)),
-    ],
-    ids=["frictionless", "LuGre"],
-)
-def test_the_law_holds_the_circle_on_a_trackers_samples(
-    rig: Parameters, setpoints: tuple[float, ...], typical: tuple[float, ...], most: tuple[float, ...]
-) -> None:
-    root_mean_square, greatest, saturated = on_the_circle(rig, setpoints, observed=True)
-    assert np.all(root_mean_square < typical)
-    assert np.all(greatest < most)
-    assert np.all(saturated < 0.03)
-
-
-def test_without_the_observer_a_stiff_setpoint_is_lost() -> None:
-    """At 4000 N/m the delay of low-passed differences destabilises what the observer holds within half a millimetre."""
-    root_mean_square, _, saturated = on_the_circle(closed_loop.FRICTIONLESS, (4000.0,), observed=False, seconds=2.0)
-    assert root_mean_square.max() > 0.01
-    assert saturated[0] > 0.1

@@ -11,7 +11,6 @@ import agents  # noqa: F401  registers the residual environments
 from baselines.registry import make_controller
 from baselines.staged import driving
 from birthsim_env.gradients import Recorder
-from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.gradients.checks import CONTROLLERS
@@ -67,18 +66,6 @@ def test_gradients_are_numbers_where_episodes_begin() -> None:
     assert np.abs(carried).max() > 0.0
 
 
-@pytest.mark.slow
-def test_converters_of_many_bits_have_the_gradients_of_none() -> None:
-    """What is rounded passes straight through."""
-    found = []
-    for bits in (0.0, 32.0):
-        rig = Parameters().replace({"electronics.adc_bits": bits, "electronics.dac_bits": bits})
-        env = begun("BirthSIM/Circle-v1", 8, "pid", sensors="honest", parameters=rig)
-        found.append(env.simulation.vjp(np.zeros((0, 8)))(motion=np.ones((4, 8)))[0])
-    none, fine = found
-    assert np.all(np.abs(fine - none) <= 1e-4 * np.abs(none) + 1e-6 * np.abs(none).max(axis=1, keepdims=True))
-
-
 def test_observations_state_and_motion_have_gradients() -> None:
     """Openings drive pistons: what an observed error, the true place and a piston say of it is the same."""
     env = lanes_of(40)
@@ -105,18 +92,3 @@ def test_threads_change_no_bit() -> None:
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)
         assert np.abs(one).max() > 0
-
-
-def test_what_has_no_gradients_is_refused_by_name() -> None:
-    class Own(UserForce):
-        def force(self, time: Any, position: Any, velocity: Any) -> Any:
-            return np.zeros((*time.shape[:1], 2, time.shape[1]))
-
-    for arguments, words in (
-        ({"user_force": Own()}, "user's own part.*allowed"),
-        ({"parameters": None, "randomize": {"valves.deadband": (0.01, 0.02)}}, r"valves\.deadband.*allowed"),
-    ):
-        env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, **arguments)
-        env.reset(seed=0)
-        with pytest.raises(ValueError, match=words):
-            Recorder(env.unwrapped.simulation).prepare()  # type: ignore[attr-defined]

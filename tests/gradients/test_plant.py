@@ -7,13 +7,11 @@ import numba
 import numpy as np
 import pytest
 
-from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.gradients.plant import Derivatives, jvp, rig_jacobian, vjp
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.gradients.plant import Derivatives, jvp, vjp
 from birthsim_env.physics.gradients.right_hand_side import INPUTS, RIG, made
-from birthsim_env.physics.rig.parameters import load_parameters
 from studies.gradients.states import SCALES, plant_of
 
 DURATION = 0.01
@@ -83,28 +81,6 @@ def test_reverse_is_forward_mode() -> None:
     few = pullback(weight)
     assert few.rig is None
     np.testing.assert_allclose(few.state, back.state, rtol=1e-12, atol=1e-12 * np.abs(back.state).max())
-
-
-def test_parameters_follow_by_the_chain_rule() -> None:
-    rig = load_parameters(None)
-    names = ("mechanics.mass", "cylinder1.coulomb_friction", "valves.critical_ratio", "air.temperature", "chambers.dead_volume")
-    found = rig_jacobian(rig, names)
-    for column, name in zip(found.T, names, strict=True):
-        section, own = name.split(".")
-        value = getattr(getattr(rig, section), own)
-        ends = [parameter_column(rig.replace({name: value * (1 + size)})) for size in (1e-5, -1e-5)]
-        difference = (ends[0] - ends[1]) / (2e-5 * value)
-        np.testing.assert_allclose(column, difference, rtol=1e-8, atol=1e-8 * np.abs(difference).max())
-    with pytest.raises(ValueError, match=r"geometry\.d3.*allowed"):
-        rig_jacobian(rig, ("geometry.d3",))
-
-
-@pytest.mark.parametrize(
-    ("field", "value"), [("air.supply_conductance", 1e-8), ("mechanics.mode_frequency", 20.0), ("valves.deadband", 0.1)]
-)
-def test_options_are_refused_by_name(field: str, value: float) -> None:
-    with pytest.raises(ValueError, match=field):
-        Plant(Parameters().replace({field: value})).vjp(np.zeros((4, 1)), np.zeros((2, 1)), DURATION)
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads the processor's instructions")

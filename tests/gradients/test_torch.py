@@ -1,7 +1,6 @@
 """PyTorch through the closed loop: a loss of one's own, the end of an episode, and a policy that learns."""
 
-import importlib.util
-from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import gymnasium
@@ -12,8 +11,7 @@ torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed
 
 from agents.gradients.rollouts import Worlds  # noqa: E402
 from tests.build.targets import need_threads  # noqa: E402
-
-ROOT = Path(__file__).resolve().parent.parent.parent
+from tests.console import ROOT  # noqa: E402
 
 
 def worlds_of(lanes: int, **arguments: Any) -> Worlds:
@@ -73,19 +71,9 @@ def test_worlds_that_end_otherwise_are_refused() -> None:
         Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2))
 
 
-def example(name: str) -> Any:
-    """A script of ``examples`` as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
 def test_the_example_learns_in_a_hundred_updates() -> None:
-    errors = example("gradients").train(120)
+    errors = run_path(f"{ROOT}/examples/gradients.py")["train"](120)
     assert np.median(errors[-20:]) < 1.5
     assert np.median(errors[:20]) > 3.0
 
@@ -114,7 +102,7 @@ def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str
 @pytest.mark.slow
 def test_a_policy_learns_the_circle_by_gradients_of_a_device() -> None:
     need_threads()
-    train = example("device_policy_gradient").train
+    train = run_path(f"{ROOT}/examples/device_policy_gradient.py")["train"]
     errors = train("host", 120, 32)
     assert np.median(errors[-20:]) < 0.3 * np.median(errors[:20])
     assert train("cpu", 10, 32) == errors[:10]

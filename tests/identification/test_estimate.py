@@ -57,19 +57,6 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
         assert abs(gradient[k] - central) / size[k] < 0.05, QUANTITIES[k].name
 
 
-def test_start_states_explain_nothing_that_remains(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(starts, "CLOSE", 1e-5)
-    asked, theta = problem(), coordinates(TRUE, QUANTITIES)
-    asked.jacobian(theta)
-    assert asked.slopes is not None
-    along = asked.slopes.explained(asked.derivatives)
-    assert np.abs(along).max() < 1e-9 * np.abs(asked.derivatives).max()
-    free, residual = asked.settled(theta)
-    left = asked.slopes.explained(residual[..., None])
-    assert np.abs(left).max() < 1e-3
-    assert np.isfinite(free).all()
-
-
 @pytest.mark.parametrize("one", QUANTITIES, ids=lambda one: one.name)
 def test_coordinates_go_there_and_back(one: Quantity) -> None:
     value = value_of(TRUE, one.name)

@@ -1,12 +1,11 @@
 """birthsim identify as a user runs it: an experiment, its log, the rig; Ctrl-C."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from baselines.commands import identify
-from baselines.identification.identified import REMEMBER, Identified
+from baselines.identification.identified import REMEMBER
 from baselines.identification.identified import identify as identify_trial
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from tests.console import call
@@ -60,17 +59,3 @@ def test_a_rig_with_states_that_no_log_holds_is_refused(name: str) -> None:
     rig = OWNER.replace({name: field_of(name).metadata["worth"][1]})
     with pytest.raises(ValueError, match=f"{name} = .*; allowed for an identification: 0, "):
         identify_trial(part(trial(), 0, 2100), rig)
-
-
-def test_ctrl_c_is_one_line_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupted(*_: Any, **__: Any) -> Identified:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(identify, "identify", interrupted)
-    monkeypatch.setattr(identify, "read_trial", lambda *_: part(trial(), 0, 2100))
-    status, printed, complained = call("identify", monkeypatch, capsys, "log.csv", "--out", tmp_path / "rig.toml")
-    assert (status, printed) == (130, "")
-    assert complained.endswith("birthsim identify: interrupted\n")
-    assert list(tmp_path.iterdir()) == []

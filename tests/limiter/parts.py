@@ -1,4 +1,4 @@
-"""The limiter's parts by themselves: kernels that call its helpers, over N lanes."""
+"""The limiter's parts by themselves, over N lanes."""
 
 import numpy as np
 
@@ -7,29 +7,8 @@ from baselines.limiter.past import recall, slots_of
 from baselines.limiter.port_energy import Energy, Work, count_work
 from birthsim_env.loop.rows import Signals, fill_measurement
 from birthsim_env.loop.signals import InPlane, Joints
-from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
+from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
-
-
-@kernel
-def _recall(kept: Array, newest: Array, slots: int, late: Array, signals: Array, told: Array) -> None:
-    for i in range(late.shape[0]):
-        recall(kept, newest, slots, late[i], signals, told, i)
-
-
-@kernel
-def _count(own: Energy, seen: Signals, force: Array, work: Work) -> None:
-    for i in range(force.shape[1]):
-        count_work(own, seen, force, work, i)
-
-
-@kernel
-def _passive(
-    forces: Array, rate: float, hand: InPlane, here: Joints, there: Joints, seen: Signals, p: Rig, opening: Array
-) -> None:  # fmt: skip
-    for i in range(hand.x.shape[0]):
-        air_spring.passive_openings(forces, rate, seen.pressure, hand, here, there, seen, p, opening, i)
 
 
 def signals_of(measurement, reference):
@@ -48,7 +27,8 @@ class Past:
 
     def at(self, late, signals):
         told = np.empty_like(signals)
-        _recall(self.kept, self.newest, self.slots, late / self.period, signals, told)
+        for lane, periods in enumerate(late / self.period):
+            recall(self.kept, self.newest, self.slots, periods, signals, told, lane)
         return told
 
 
@@ -58,7 +38,8 @@ class PortEnergy:
         self.own.stamp[:] = -np.inf
 
     def update(self, measurement, reference, force):
-        _count(self.own, signals_of(measurement, reference), force, self.work)
+        for lane in range(force.shape[1]):
+            count_work(self.own, signals_of(measurement, reference), force, self.work, lane)
         return self.work
 
 
@@ -72,5 +53,7 @@ class AirSpring:
             joints.append(Joints(np.empty((Joints.size, place.shape[1]))))
             pistons_at(np.concatenate([place, np.zeros_like(place)]), Rig(self.p), joints[-1].rows)
         seen = signals_of(measurement, reference)
-        _passive(self.forces, self.rate, InPlane(seen.user_force.copy()), *joints, seen, Rig(self.p), opening)
+        for lane in range(opening.shape[1]):
+            hand = InPlane(seen.user_force.copy())
+            air_spring.passive_openings(self.forces, self.rate, seen.pressure, hand, *joints, seen, Rig(self.p), opening, lane)
         return opening

@@ -44,12 +44,12 @@ def targets(lanes=1):
     return resting([(0.5, 0.0)] * lanes, [KX] * lanes)
 
 
-def run(damping, limiter, seconds=6.0, lanes=1):
+def run(damping, limiter, seconds=6.0):
     """A mass on the spring that is asked for, with ``damping`` (N s/m), pushed to and fro: least authority, and at the end."""
     w, place, speed, least = 2 * math.pi * 1.0, 0.0, 0.0, 1.0
     for k in range(round(seconds / T)):
         force = 30.0 * math.sin(w * k * T)
-        limiter.command(seen(k * T, np.full(lanes, place), speed, force), targets(lanes))
+        limiter.command(seen(k * T, np.array([place]), speed, force), targets())
         least = min(least, float(limiter.authority.min()))
         speed += T * (force - damping * speed - KX * place) / MASS
         place += T * speed
@@ -114,17 +114,6 @@ def test_a_compiled_loop_and_calls_once_a_period_give_the_same_bits(law):
         assert limiter.authority.min() < 1.0
         ends.append(np.concatenate(env.unwrapped.simulation.rows()))
     np.testing.assert_array_equal(*ends)
-
-
-def test_a_lane_starts_anew():
-    inner = Full()
-    limiter = PortLimiter(inner, RIG)
-    run(-20.0, limiter, 3.0, lanes=2)
-    limiter.reset(np.array([True, False]))
-    assert limiter.authority[0] == 1.0 > limiter.authority[1]
-    np.testing.assert_array_equal(inner.forgotten, [True, False])
-    out = limiter.command(seen(0.0, np.full(2, 0.05), 0.0, -50.0), targets(2))
-    assert (out[:, 0] == 1.0).all(), "what was before a start does no work"
 
 
 def test_a_law_that_returns_no_openings_is_refused_by_name():

@@ -9,9 +9,9 @@ import threading
 import time
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 
-ROOT = Path(__file__).parent.parent.parent
+from tests.console import ROOT
+
 NAMES = (
     *("chromium", "chromium-browser", "chromium-headless-shell", "headless_shell", "chrome-headless-shell"),
     *("google-chrome", "google-chrome-stable", "google-chrome-beta", "google-chrome-unstable", "chrome"),
@@ -35,15 +35,10 @@ with sync_playwright() as playwright:
 """
 INSTALLATION = "apt-get install chromium-headless-shell, or .venv/bin/playwright install chromium"
 FONT = "Liberation Sans"
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+ARGUMENTS = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync"),
+)
 WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 400, "height": 800}
 CALM = "?controller=admittance-backstepping"
 """What a page's address asks for so that the end effector comes to rest; the paper's law hunts."""
@@ -94,10 +89,10 @@ class Server:
 
     def __init__(self, command, *arguments, port=0):
         line = [sys.executable, "-m", "birthsim", *command.split(), *map(str, arguments), "--port", str(port)]
-        self._process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         said = []
         # It names its address once it listens; a process that fails closes the pipe.
-        for text in self._process.stdout:
+        for text in self.process.stdout:
             said.append(text)
             if found := re.search(r"http://[^/\s]+:(\d+)", text):
                 self.url, self.port = f"{found[0]}/", int(found[1])
@@ -110,7 +105,7 @@ class Server:
 
     def __exit__(self, *_):
         """Ends by the signal that service managers send; whoever does not listen is killed."""
-        with self._process as process:
+        with self.process as process:
             process.terminate()
             try:
                 process.communicate(timeout=PATIENCE)
@@ -119,14 +114,15 @@ class Server:
 
 
 class Folder:
-    """A server of the files in a folder, as ``python -m http.server``; entering gives its address."""
+    """A server of the files in a folder, as ``python -m http.server``, at ``url``."""
 
     def __init__(self, folder):
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
+        self.url = f"http://127.0.0.1:{self._server.server_port}/"
 
     def __enter__(self):
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
-        return f"http://127.0.0.1:{self._server.server_port}/"
+        return self
 
     def __exit__(self, *_):
         self._server.shutdown()
@@ -146,8 +142,8 @@ def launch(playwright):
 
 
 class Window:
-    """One tab with the page, and with its ``lab`` open unless told otherwise; ``complaints`` collects console errors,
-    ``foreign`` requests that left this machine."""
+    """One tab with the page, and with its ``lab`` open unless told otherwise; at its end there must have been no
+    ``complaints``, which are console errors, and no ``foreign`` requests, which left this machine."""
 
     def __init__(self, browser, url, size=WIDE, touch=False, lab=True):
         self.context = browser.new_context(viewport=size, accept_downloads=True, has_touch=touch)
@@ -163,8 +159,9 @@ class Window:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, failed, *_):
         self.context.close()
+        assert failed or (self.complaints, self.foreign) == ([], [])
 
     def _asked(self, request):
         if not re.match(r"(https?|wss?)://127\.0\.0\.1[:/]|data:|blob:", request.url):
@@ -179,7 +176,8 @@ class Window:
         end = time.monotonic() + seconds
         while not (found := self._value_by_now(expression)):
             if time.monotonic() > end:
-                raise AssertionError(f"never within {seconds} s: {expression}; last seen {found!r}; {self.value('birthsim')}")
+                seen = self.value("[birthsim.frame, birthsim.settings, birthsim.state]")
+                raise AssertionError(f"never within {seconds} s: {expression}; last seen {found!r}; {seen}")
             self.page.wait_for_timeout(30)
         return found
 
@@ -197,17 +195,36 @@ class Window:
     def frame(self):
         return self.value("birthsim.frame")
 
-    def end_effector(self):
-        """Where the end effector is in the window, px."""
-        return self.value("birthsim.pixel(birthsim.frame.position)")
+    def choose(self, **choices):
+        """Choose in lists, one after the other, and wait until the rig has each."""
+        for name, choice in choices.items():
+            self.page.locator(f"select[name={name}]").select_option(choice)
+            self.wait(f"birthsim.settings.{name} === '{choice}'")
+
+    def pause(self, paused=True):
+        self.page.evaluate(f"birthsim.send({{ type: 'pause', paused: {str(paused).lower()} }})")
+        self.wait(f"birthsim.state.paused === {str(paused).lower()}")
+
+    def play(self, recording):
+        self.page.locator("#choose").set_input_files(recording)
+        self.wait("birthsim.hello.mode === 'replay'")
+
+    def back(self):
+        """From a recording to the rig."""
+        self.page.locator("#back").click()
+        self.wait("birthsim.hello.mode === 'live'")
+
+    def end_effector(self, rig=0):
+        """Where the end effector of the first or the second rig is in the window, px."""
+        return self.value(f"birthsim.pixel(birthsim.frame{'.second' * rig}.position, {rig})")
 
     def live(self, seconds):
         """Wait until the rig has lived through so many seconds of its own time."""
         self.wait(f"birthsim.frame.time > {self.frame()['time'] + seconds}")
 
-    def hold(self, across=0.0, up=0.0):
+    def hold(self, across=0.0, up=0.0, rig=0):
         """Press the mouse on the end effector and pull it by (across, up) px."""
-        x, y = self.end_effector()
+        x, y = self.end_effector(rig)
         mouse = self.page.mouse
         mouse.move(x, y)
         mouse.down()

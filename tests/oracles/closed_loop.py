@@ -1,6 +1,7 @@
 """A rig under a law, control period by control period, for the tests of the controllers: measurements and references."""
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,23 @@ from birthsim_env.physics.rig.parameters import Parameters
 FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
 """Neither Coulomb nor Stribeck friction; the viscous part stays."""
 
+
+ANOTHER = Parameters().replace(
+    {
+        "geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.2,
+        "cylinder1.viscous_friction": 55.0, "cylinder2.coulomb_friction": 22.0, "cylinder2.rod_diameter": 0.012,
+        "air.temperature": 300.0, "air.polytropic_index": 1.3, "valves.critical_ratio": 0.4, "valves.time_constant": 0.006,
+    }
+)  # fmt: skip
+"""A rig of which most figures are others."""
+
+
+def slippery(scale: float, law: str = "lugre") -> Parameters:
+    """The rig with ``scale`` times its Coulomb friction, 12 and 15 N."""
+    coulomb = {"cylinder1.coulomb_friction": 12.0 * scale, "cylinder2.coulomb_friction": 15.0 * scale}
+    return Parameters().replace({**coulomb, "friction.law": law})
+
+
 PNEUMATIC_STIFFNESS = np.array([[4400.0], [2200.0]])
 """N/m, of both cylinders: inside the range of (9) at all poses that the tests use."""
 
@@ -28,6 +46,19 @@ def shorten_probes(
     """Stiffness tests with other times than those of the comparison, s, for as long as ``patch`` lasts."""
     for name, seconds in (("REST", rest), ("RISE", rise), ("HOLD", hold), ("WINDOW", window)):
         patch.setattr(probes, name, seconds)
+
+
+def pushes(
+    forces: Sequence[float],
+    setpoints: Sequence[float] = (1000.0, 2000.0, 4000.0),
+    rigs: Sequence[Parameters] = (Parameters(),),
+    poses: Sequence[tuple[float, float]] = probes.POSES,
+) -> probes.StiffnessTest:
+    """Every force, N, along both axes at every pose and setpoint, N/m, on every rig: a lane each."""
+    place, stiffness, axis, force, own = zip(*itertools.product(poses, setpoints, (0, 1), forces, rigs), strict=True)
+    push = np.array(force) * (np.array(axis) == np.array([[0], [1]]))
+    rows = np.array([stiffness, stiffness, np.zeros(len(force))])
+    return probes.StiffnessTest(np.array(place).T.copy(), push, rows, own if len(rigs) > 1 else rigs[0])
 
 
 def ideal(plant: Plant, time: float, force: Array) -> Measurement:

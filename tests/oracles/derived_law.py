@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
+from studies.accuracy import second_model
 from tests.oracles import linkage_by_points as by_points
 
 STATE = sp.symbols("y1 y2 v1 v2 F1 F2", real=True)
@@ -164,16 +165,10 @@ def flows_for(rates: Array, air: Any, y: float, v: float, cylinder: Cylinder, ri
 
 
 def orifice(conductance: float, p_from: float, p_to: float, rig: Parameters) -> float:
-    """ISO 6358 at ambient temperature, kg/s, either way."""
-    up, b = max(p_from, p_to), rig.valves.critical_ratio
-    ratio = min(p_from, p_to) / up
-    if ratio <= b:
-        psi = 1.0
-    else:
-        psi = math.sqrt(1 - ((min(ratio, 0.99) - b) / (1 - b)) ** 2)
-        psi *= min(1.0, (1 - ratio) / 0.01)
-    density = rig.air.reference_density * math.sqrt(rig.air.reference_temperature / rig.air.temperature)
-    return math.copysign(conductance * density * up * psi, p_from - p_to)
+    """ISO 6358 at ambient temperature, kg/s, either way, by the second model."""
+    air, up, down = rig.air, max(p_from, p_to), min(p_from, p_to)
+    reference = rig.valves.critical_ratio, air.reference_density, air.reference_temperature
+    return math.copysign(second_model.orifice(conductance, up, air.temperature, down, *reference), p_from - p_to)
 
 
 def net_flow(opening: float, pressure: float, rig: Parameters) -> float:

@@ -42,14 +42,12 @@ class Untold(IdealSensors):
         return replace(super().measure(*signals), sampled=True)
 
 
-class UntoldInTheLoop(Untold):
-    """The same, compiled."""
-
+class InTheLoop(Untold):
     def stage(self):
         return Stage(ideal_stage)
 
 
-@pytest.mark.parametrize("model", [Untold, UntoldInTheLoop])
+@pytest.mark.parametrize("model", [Untold, InTheLoop])
 def test_own_sensors_that_tell_none_are_refused_where_the_rig_has_one(model, monkeypatch):
     monkeypatch.setitem(SENSORS, "own", model)
     gymnasium.make("BirthSIM/Circle-v1", sensors="own").reset(seed=0)

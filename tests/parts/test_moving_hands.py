@@ -83,14 +83,6 @@ def test_the_guiding_hand_is_a_mass_between_two_springs():
     np.testing.assert_allclose(found, expected, atol=0.03 * np.abs(expected).max())
 
 
-def test_at_rest_it_is_both_springs_in_a_row():
-    hand = began(Guided(1.0, 400.0))
-    place, rest = np.array([0.5, 0.0]), np.zeros(2)
-    hand.force(np.zeros((1, 1)), place[:, None], rest[:, None])
-    held = walk(hand, lambda t: place + np.array([0.01, 0]), lambda t: rest, np.arange(0.001, CALM, 0.001))[-1]
-    np.testing.assert_allclose(held, [-0.01 / (1 / 400 + 1 / hand.GRIP[0]), 0], atol=1e-3)
-
-
 def test_asked_again_it_says_the_same_and_a_new_episode_takes_hold_anew():
     hand = began(Guided(), 2)
     place, rest = np.array([[0.5, 0.5], [0.0, 0.1]]), np.zeros((2, 2))

@@ -11,31 +11,29 @@ PROBE = "BirthSIM/Probe-v2"
 
 
 class Leaky:
-    """Three numbers in, openings of a table out; it remembers how often a lane was asked, and its action at half the rate."""
+    """Openings of a table; it remembers how often a lane was asked, and its first ``shown`` actions, each at half the rate."""
 
-    names = ("one", "two", "three")
-    memory_names = ("calls, 1000", "smoothed one, 1")
-    size = 3
-
-    def __init__(self, lanes, every_period=True):
-        self.every_period = every_period
-        self.calls, self.smooth, self.begun = np.zeros(lanes), np.zeros(lanes), []
+    def __init__(self, lanes, every_period=True, size=3, shown=1):
+        self.every_period, self.size = every_period, size
+        self.names = tuple(f"entry {k}" for k in range(size))
+        self.memory_names = ("calls, 1000", *(f"smoothed {k}, 1" for k in range(shown)))
+        self.calls, self.smooth, self.begun = np.zeros(lanes), np.zeros((shown, lanes)), []
         self.table = np.repeat([[0.02], [-0.02], [0.01], [-0.01]], lanes, axis=1)
 
     def begin(self, lanes):
         self.begun.append(lanes.copy())
-        self.calls[lanes], self.smooth[lanes] = 0.0, 0.0
+        self.calls[lanes], self.smooth[:, lanes] = 0.0, 0.0
 
     def accept(self, actions):
-        assert actions.shape == (3, len(self.calls))
-        self.smooth = 0.5 * (self.smooth + actions[0])
+        assert actions.shape == (self.size, len(self.calls))
+        self.smooth = 0.5 * (self.smooth + actions[: len(self.smooth)])
 
     def openings(self, plant, measurement, reference):
         self.calls += 1
         return self.table
 
     def memory(self):
-        return np.stack([self.calls / 1000, self.smooth])
+        return np.concatenate([[self.calls / 1000], self.smooth])
 
 
 @pytest.mark.parametrize("every_period", [True, False])
@@ -43,9 +41,8 @@ def test_a_policy_sees_the_memory_after_its_last_action(every_period):
     env = gymnasium.make_vec(PROBE, num_envs=2, actuation=Leaky(2, every_period))
     assert env.single_action_space.shape == (3,)
     assert env.single_observation_space.shape == (SIZE + 5,)
-    assert env.observation_names[SIZE:] == (
-        *("last action: one", "last action: two", "last action: three", "calls, 1000", "smoothed one, 1"),
-    )
+    last = tuple(f"last action: entry {k}" for k in range(3))
+    assert env.observation_names[SIZE:] == (*last, "calls, 1000", "smoothed 0, 1")
     observation, _ = env.reset(seed=0)
     np.testing.assert_array_equal(observation[:, SIZE:], 0)
     smooth = np.zeros(2)
@@ -84,36 +81,14 @@ def test_the_openings_that_an_actuation_keeps_are_not_written_to():
     np.testing.assert_array_equal(actuation.table, table)
 
 
-class Many:
-    """An actuation of any length that shows all that it was told."""
-
-    every_period = False
-
-    def __init__(self, size, shown):
-        self.size, self.names = size, tuple(f"entry {k}" for k in range(size))
-        self.memory_names, self.told = tuple(f"told {k}" for k in range(shown)), np.zeros((shown, 1))
-
-    def begin(self, lanes):
-        self.told[:] = 0.0
-
-    def accept(self, actions):
-        self.told[:] = actions[: len(self.told)]
-
-    def openings(self, plant, measurement, reference):
-        return np.zeros((4, 1))
-
-    def memory(self):
-        return self.told
-
-
 def test_long_actions_and_memories_have_room_up_to_a_length_that_is_said():
-    env = gymnasium.make(PROBE, actuation=Many(64, 64)).unwrapped
+    env = gymnasium.make(PROBE, actuation=Leaky(1, size=64, shown=63)).unwrapped
     env.reset(seed=0)
     action = np.linspace(-1, 1, 64).astype(np.float32)
-    for _ in range(3):
+    for share in (0.5, 0.75, 0.875):
         observation, *_ = env.step(action)
-        np.testing.assert_array_equal(observation[SIZE:], np.tile(action, 2))
-        np.testing.assert_array_equal(env.simulation.openings, 0)
-    for size, shown in ((65, 0), (4, 65)):
+        np.testing.assert_array_equal(observation[SIZE : SIZE + 64], action)
+        np.testing.assert_allclose(observation[SIZE + 65 :], share * action[:63], rtol=1e-6)
+    for size, shown in ((65, 0), (4, 64)):
         with pytest.raises(ValueError, match="allowed: at most 64"):
-            gymnasium.make(PROBE, actuation=Many(size, shown))
+            gymnasium.make(PROBE, actuation=Leaky(1, size=size, shown=shown))

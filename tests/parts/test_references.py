@@ -59,48 +59,34 @@ def test_derivatives_of_every_scenario_fit_together(name, kind, seed):
     assert_consistent(trajectory, times)
 
 
-@given(
-    st.floats(-3.2, 3.2), st.floats(0.0, 0.1), st.floats(0.04, 0.1), st.floats(-2.0, 2.0), st.floats(0.5, 5.0), st.floats(0, 2)
-)  # fmt: skip
-def test_a_path_ends_where_line_and_arc_lead(heading, length, radius, angle, lasts, begins):
+LINES_AND_ARCS = {
+    "heading": st.floats(-3.2, 3.2), "length": st.floats(0.0, 0.1), "radius": st.floats(0.04, 0.1), "angle": st.floats(-2, 2),
+    "begins": st.floats(0, 2), "lasts": st.floats(0.5, 5.0), "u": st.floats(-0.2, 1.2),
+}  # fmt: skip
+
+
+@given(**LINES_AND_ARCS)
+def test_a_path_is_a_line_and_an_arc_at_minimum_jerk(heading, length, radius, angle, begins, lasts, u):
     path = prepared(Path((0.5, 0.01), heading, length, radius, angle, begins, begins + lasts))
-    forward, left = np.exp(1j * heading), 1j * np.exp(1j * heading)
-    corner = 0.5 + 0.01j + length * forward
+    s = min(max(u, 0.0), 1.0)
+    gone = (length + radius * abs(angle)) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    forward = np.exp(1j * heading)
     # The arc turns about a centre to the left for positive angles, to the right for negative ones.
-    centre = corner + math.copysign(radius, angle) * left
-    end = centre + (corner - centre) * np.exp(1j * angle)
-    rows = sampled(path, [0.0, begins, begins + lasts, begins + lasts + 1.0])
-    reached = rows[0] + 1j * rows[1]
-    np.testing.assert_allclose(reached, [0.5 + 0.01j, 0.5 + 0.01j, end, end], atol=1e-12)
-    np.testing.assert_allclose(rows[2:], 0.0, atol=1e-9)
-
-
-@given(st.floats(0.05, 0.95), st.sampled_from([-1.3, 0.9]))
-def test_a_path_covers_its_length_at_minimum_jerk_and_heads_along_it(u, angle):
-    path = prepared(Path((0.5, 0.0), 0.3, 0.05, 0.06, angle, 0.0, 4.0))
-    total = 0.05 + 0.06 * abs(angle)
-    x, y, vx, vy, ax, ay = sampled(path, [4.0 * u])[:6, 0]
-    gone = total * (10 * u**3 - 15 * u**4 + 6 * u**5)
-    speed = total * 30 * u**2 * (1 - u) ** 2 / 4.0
-    turned = math.copysign(max(gone - 0.05, 0.0) / 0.06, angle)
-    assert math.hypot(vx, vy) == pytest.approx(speed, rel=1e-9)
-    assert math.atan2(vy, vx) == pytest.approx(0.3 + turned, abs=1e-9)
-    curvature = math.copysign(1 / 0.06, angle) if gone > 0.05 else 0.0
-    assert vx * ay - vy * ax == pytest.approx(curvature * speed**3, abs=1e-12)
-    if gone <= 0.05:
-        assert (x, y) == pytest.approx((0.5 + gone * math.cos(0.3), gone * math.sin(0.3)), abs=1e-12)
+    corner, aside = 0.5 + 0.01j + length * forward, math.copysign(radius, angle) * 1j * forward
+    turned = corner + aside - aside * np.exp(1j * math.copysign((gone - length) / radius, angle))
+    rows = sampled(path, [begins + u * lasts])[:, 0]
+    assert complex(*rows[:2]) == pytest.approx(turned if gone > length else 0.5 + 0.01j + gone * forward, abs=1e-12)
+    if s != u:
+        np.testing.assert_allclose(rows[2:], 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("period", "radius"), [(4.0, 0.05), (-4.0, 0.05), (2.5, 0.03)])
-def test_a_circle_closes_keeps_its_radius_and_its_sense(period, radius):
-    circle = prepared(Circle((0.5, -0.01), radius, period))
-    times = np.linspace(0.0, abs(period), 33)
-    rows = sampled(circle, times)
-    np.testing.assert_allclose(rows[:, 0], rows[:, -1], atol=1e-9)
-    np.testing.assert_allclose(rows[:2, 0], (0.5 + radius, -0.01), atol=1e-12)
-    np.testing.assert_allclose(np.hypot(rows[0] - 0.5, rows[1] + 0.01), radius)
-    np.testing.assert_allclose(np.hypot(rows[2], rows[3]), 2 * math.pi * radius / abs(period))
-    assert rows[1, 8] == pytest.approx(-0.01 + math.copysign(radius, period))
+def test_a_circle_has_its_radius_and_its_sense(period, radius):
+    circle, times = prepared(Circle((0.5, -0.01), radius, period)), np.linspace(0.0, abs(period), 33)
+    turned = 2 * math.pi * times / period
+    place = 0.5 + radius * np.cos(turned), -0.01 + radius * np.sin(turned)
+    np.testing.assert_allclose(sampled(circle, times)[:2], place, atol=1e-12)
+    assert_consistent(circle, times)
 
 
 def test_hold_stays():
@@ -121,15 +107,11 @@ def boundary_margin(x, y):
 def test_descent_is_ten_centimetres_of_line_and_the_arc_of_the_design(kind):
     lanes = 300 if kind == "varied" else 1
     path = prepared(getattr(SCENARIOS["descent"], kind)()[0], lanes)
-    own = path._own
-    length, radius, angle = own[3], own[4], np.degrees(own[5])
+    length, radius, angle = path._own[3], path._own[4], np.degrees(path._own[5])
     np.testing.assert_allclose(length, 0.10)
-    limits = {"radius": (radius, 0.06, 0.08), "angle": (angle, 70.0, 90.0)}
-    for name, (values, low, high) in limits.items():
-        assert low <= values.min(), name
-        assert values.max() <= high, name
-        if kind == "varied":
-            assert np.ptp(values) > 0.97 * (high - low), name
+    for values, low, high in ((radius, 0.06, 0.08), (angle, 70.0, 90.0)):
+        assert low <= values.min() <= values.max() <= high
+        assert kind == "nominal" or np.ptp(values) > 0.97 * (high - low)
     # Measured on the path itself: its length, and the turn of its heading at the end.
     times = np.linspace(0.0, 24.0, 1501)
     points = np.stack([path.sample(np.full(lanes, t))[:2] for t in times])
@@ -146,8 +128,8 @@ def test_every_varied_draw_is_reachable_all_the_way(name):
     assert boundary_margin(points[:, 0], points[:, 1]).min() > 0.0
 
 
-class Lissajous(Trajectory):
-    """What a user writes: two sines about the centre."""
+class Wave(Trajectory):
+    """What a user writes: a sine about the centre."""
 
     def prepare(self, num_envs):
         self.phase = np.zeros(num_envs)
@@ -156,29 +138,24 @@ class Lissajous(Trajectory):
         self.phase[lane] = rng.uniform(0, 1)
 
     def sample(self, time):
-        rows = []
-        for order in range(4):
-            turn = order * math.pi / 2
-            rows += [0.04 * np.sin(time + self.phase + turn), 0.02 * 2**order * np.sin(2 * time + turn)]
-        return np.array(rows) + np.array([0.5, 0, 0, 0, 0, 0, 0, 0])[:, None]
+        rows = np.zeros((8, len(time)))
+        rows[::2] = [0.04 * np.sin(time + self.phase + order * math.pi / 2) for order in range(4)]
+        rows[0] += 0.5
+        return rows
 
 
 def test_a_users_own_trajectory_serves_one_lane_and_many():
-    assert_consistent(prepared(Lissajous()), np.linspace(0.1, 6, 50))
-    many = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, reference=Lissajous(), user_force=None)
-    rows, infos = many.reset(seed=20)
+    assert_consistent(prepared(Wave()), np.linspace(0.1, 6, 50))
+    many = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, reference=Wave())
+    one = gymnasium.make("BirthSIM/Probe-v2", reference=Wave())
+    _, infos = many.reset(seed=20)
+    one.reset(seed=22)
     np.testing.assert_allclose(infos["tracking_error"], 0.0, atol=1e-12)
-    assert len(np.unique(infos["target"][:, 0])) == 3
     for _ in range(20):
-        rows = many.step(np.zeros((3, 4)))[0]
-    for lane in range(3):
-        one = gymnasium.make("BirthSIM/Probe-v2", reference=Lissajous())
-        one.reset(seed=20 + lane)
-        for _ in range(20):
-            row, _, _, _, info = one.step(np.zeros(4))
-        np.testing.assert_array_equal(rows[lane], row)
-        phase = stream(20 + lane, 0, "reference").uniform(0, 1)
-        np.testing.assert_allclose(info["target"], (0.5 + 0.04 * math.sin(0.2 + phase), 0.02 * math.sin(0.4)))
+        (rows, *_, infos), (row, *_) = many.step(np.zeros((3, 4))), one.step(np.zeros(4))
+        np.testing.assert_array_equal(rows[2], row)
+    phases = np.array([stream(20 + lane, 0, "reference").uniform(0, 1) for lane in range(3)])
+    np.testing.assert_allclose(infos["target"][:, 0], 0.5 + 0.04 * np.sin(0.2 + phases))
 
 
 LATE = (116, 243)
@@ -206,11 +183,6 @@ def test_an_odd_rig_that_is_taken_reaches_every_later_episode(scenario):
     for env in taken:
         for _ in range(8):
             env.reset()
-
-
-def test_the_scenarios_themselves_are_reachable_by_the_default_rig():
-    for scenario in SCENARIOS.values():
-        check_drawn(scenario.varied()[0], scenario.duration, Parameters())
 
 
 def test_a_trajectory_that_is_checked_stays_as_it_was():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from birthsim_env.parts.sensors.sensors import IdealSensors, LabSensors
-from tests.parts.test_honest_sensors import board, swing, watch
+from tests.parts.test_honest_sensors import board, still, swing, watch
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -41,41 +41,27 @@ def test_samples_are_taken_240_times_a_second_on_the_control_clock():
     assert np.all(np.diff(seen["position_time"][:, 0]) >= 0)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"position_latency": 0.0},
-        {"position_latency": 0.0137},
-        {"position_rate": 1000.0},
-        {"position_rate": 90.0, "position_latency": 0.05},
-        {"control_period": 0.00025, "position_rate": 1500.0},
-        # A tracker faster than the control clock is read once a period.
-        {"control_period": 0.01},
-        {"control_period": 0.01, "position_latency": 0.0},
-        {"position_rate": 4000.0, "position_latency": 0.0003},
-        {"control_period": 0.005, "position_rate": 4000.0, "position_latency": 0.012},
-    ],
-)
-def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sample_allows(changes):
-    electronics = board(position_noise=0.0, **changes)
-    period, latency = electronics.control_period, electronics.position_latency
+CLOCKS = [
+    # control period, s, rate of the tracker, Hz, and its latency, s; one faster than the control clock is read once a period
+    *[(0.001, 240.0, 0.004), (0.001, 240.0, 0.0), (0.001, 240.0, 0.0137), (0.001, 1000.0, 0.004), (0.001, 90.0, 0.05)],
+    *[(0.00025, 1500.0, 0.004), (0.01, 240.0, 0.004), (0.01, 240.0, 0.0), (0.001, 4000.0, 0.0003), (0.005, 4000.0, 0.012)],
+]
+
+
+@pytest.mark.parametrize(("period", "rate", "latency"), CLOCKS)
+def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sample_allows(period, rate, latency):
+    electronics = board(position_noise=0.0, control_period=period, position_rate=rate, position_latency=latency)
     seen = lab(electronics, swing, round(0.6 / period))
     time = period * np.arange(len(seen["position"]))
     taken = seen["position_time"][:, 0]
+    assert taken[0] == 0.0, "the first sample is there from the start"
     assert np.all(np.diff(taken) >= 0)
-    settled = time >= latency + 1 / electronics.position_rate + period
+    settled = time >= latency + 1 / rate + period
     assert np.all(taken[time >= latency] <= time[time >= latency] - latency + 1e-9)
-    assert np.all((time - taken)[settled] <= latency + 1 / electronics.position_rate + period + 1e-9)
+    assert np.all((time - taken)[settled] <= latency + 1 / rate + period + 1e-9)
     # Without noise a sample is where the end effector was when it was taken.
     np.testing.assert_allclose(seen["position"][:, :, 0], [swing(t)[:2] for t in taken], atol=1e-12)
-    assert len(np.unique(taken)) >= 0.9 * min(electronics.position_rate, 1 / period) * (0.6 - latency) - 2
-
-
-def test_the_first_sample_is_there_from_the_start():
-    seen = lab(board(position_noise=0.0), lambda t: (0.5 + t, 0.0, 1.0, 0.0), 8)
-    np.testing.assert_array_equal(seen["position_time"][:, 0], 0.0)
-    np.testing.assert_array_equal(seen["position"][:, 0, 0], 0.5)
+    assert len(np.unique(taken)) >= 0.9 * min(rate, 1 / period) * (0.6 - latency) - 2
 
 
 def test_the_shown_velocity_is_a_slow_difference_that_finds_a_constant_speed():
@@ -86,31 +72,15 @@ def test_the_shown_velocity_is_a_slow_difference_that_finds_a_constant_speed():
     np.testing.assert_allclose(seen[:104], 0.0, atol=1e-12)
     assert 0.05 < seen[100 + 4 + 25] < 0.08  # a time constant of 20 ms behind the latency
     assert seen[-1] == pytest.approx(0.1, rel=1e-6)
-    noisy = lab(board(), None, 4000)["velocity"][200:]
+    noisy = lab(board(), still, 4000)["velocity"][200:]
     assert 1e-3 < noisy.std() < 1e-2
 
 
 def test_positions_keep_one_noise_between_samples_and_pressures_change_every_period():
-    seen = lab(board(), None, 400)
+    seen = lab(board(), still, 400)
     same = np.diff(seen["position_time"][:, 0]) == 0
     np.testing.assert_array_equal((np.diff(seen["position"][:, :, 0], axis=0) == 0).all(axis=1), same)
     assert np.abs(np.diff(seen["pressures"][:, :, 0], axis=0)).min() > 0
-
-
-def test_episodes_repeat_with_their_seed_and_differ_otherwise():
-    env = gymnasium.make(CIRCLE, sensors="lab").unwrapped
-
-    def seen(seed):
-        env.reset(seed=seed)
-        for _ in range(20):
-            observation = env.step((0.1, 0.0, 0.0, 0.1))[0]
-        return observation
-
-    first, second, other = seen(3), seen(None), seen(4)
-    np.testing.assert_array_equal(seen(3), first)
-    np.testing.assert_array_equal(seen(None), second)
-    assert not np.array_equal(first, second)
-    assert not np.array_equal(first, other)
 
 
 def test_the_laboratory_hides_the_truth_from_policy_and_controller_but_not_from_info():

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from functools import cache
 from types import FunctionType
 
-import numpy as np
-import pytest
 import sympy as sp
 
 from birthsim_env.physics import control_model
@@ -120,25 +118,3 @@ def test_flows_for_wanted_rates_invert_10() -> None:
     given = {q: split[q].subs([(QA, active), (QT, pressurization)]) for q in (QP, QN)}
     assert vanishes(total_derivative(force).subs(given) - RATE)
     assert vanishes(total_derivative(stiffness).subs(given) - stiffness_rate)
-
-
-def test_compiled_helpers_compute_what_was_proven() -> None:
-    """The machine code of the inverse against a 2 x 2 linear solve of the total derivatives, at random chambers."""
-    rng = np.random.default_rng(0)
-    rates = [total_derivative(F_OF_PRESSURES), total_derivative(stiffness_of_pressures())]
-    symbols = [PP, PN, Y, V, SP, SN, LENGTH, K, RT]
-    at_rest = sp.lambdify(symbols, [r.subs({QP: 0, QN: 0}) for r in rates])
-    slopes = sp.lambdify(symbols, [[r.diff(q) for q in (QP, QN)] for r in rates])
-    m = control_model
-    for _ in range(50):
-        pp, pn, stroke = rng.uniform(1e5, 7e5), rng.uniform(1e5, 7e5), rng.choice([0.2, 0.4])
-        y, v, wish = rng.uniform(-0.4, 0.4) * stroke, rng.uniform(-1, 1), rng.uniform([-5e3, -1e5], [5e3, 1e5])
-        ap, an, index, gas_t = 4.9e-4, 4.1e-4, rng.uniform(1, 1.4), 84149.0
-        values = (pp, pn, y, v, ap, an, stroke, index, gas_t)
-        expected = np.linalg.solve(slopes(*values), wish - np.array(at_rest(*values)))
-        lp, ln = stroke / 2 + y, stroke / 2 - y
-        stiffness = m.pneumatic_stiffness(pp, pn, ap, an, lp, ln, index)
-        active = m.active_flow_for(wish[0], stiffness, v, stroke, index, gas_t)
-        pressurization = m.pressurization_flow_for(wish[1], pp * ap - pn * an, stiffness, v, active, lp, ln, index, gas_t)
-        got = [m.chamber_flow_p(active, pressurization, lp, ln), m.chamber_flow_n(active, pressurization, lp, ln)]
-        assert got == pytest.approx(list(expected), rel=1e-9, abs=1e-15)

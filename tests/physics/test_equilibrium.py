@@ -9,7 +9,7 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import rigid_body
-from tests.physics.test_dynamics import MOVED
+from tests.physics.rigs import LAWS, MOVED
 from tests.physics.test_mechanics import bore_force
 
 LANES = 30
@@ -34,7 +34,7 @@ def friction(rig: Parameters, speed: Array) -> Array:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("law", ["lugre", "coulomb", "elasto_plastic"])
+@pytest.mark.parametrize("law", LAWS)
 def test_forces_balance_at_rest_and_in_motion(law: str) -> None:
     """Pressures carry weight, by virtual work, and the friction of steady sliding, at the stiffness (9) asked for."""
     rig = Parameters().replace({**MOVED, "friction.law": law})

@@ -2,23 +2,12 @@
 
 import mpmath
 import numpy as np
-import pytest
 
-from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array, Rig, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
-
-RIGS = {
-    "default": Parameters(),
-    "tilted pivot": Parameters().replace(
-        {"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45}
-    ),
-    "pivot below": Parameters().replace({"geometry.gamma3": -2.0, "geometry.k2": 0.6}),
-}
-each_rig = pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS.keys())
+from tests.physics.rigs import each_rig
 
 
 def piston_lengths(x: mpmath.mpf, y: mpmath.mpf, rig: Parameters) -> tuple[mpmath.mpf, mpmath.mpf]:
@@ -57,29 +46,6 @@ def test_piston_reference_is_the_inverse_geometry_and_its_three_derivatives(rig:
                 # A rounding of the whole derivative: its terms may cancel, so the scale is that of the terms.
                 scale = np.array([1.0, 1.0, 10.0, 100.0]) + np.abs(truth)
                 np.testing.assert_array_less(np.abs(joints[which::2, lane] - truth), 1e-11 * scale)
-
-
-@each_rig
-def test_a_resting_target_rests_in_the_joints_too(rig: Parameters) -> None:
-    target = np.zeros((8, 40))
-    target[:2] = points(rig, 40, np.random.default_rng(1))
-    joints = np.empty((8, 40))
-    piston_reference(target, Rig(parameter_column(rig)), joints, target.shape[1])
-    assert np.all(joints[2:] == 0)
-    np.testing.assert_allclose(geometry.end_effector(joints[:2], rig), target[:2], rtol=0, atol=1e-14)
-
-
-@each_rig
-def test_piston_motion_undoes_the_direct_model_and_the_jacobian(rig: Parameters) -> None:
-    rng = np.random.default_rng(2)
-    plant = Plant(rig, 500)
-    plant.state[[Y1, Y2]] = rng.uniform([[-0.099], [-0.199]], [[0.099], [0.199]], (2, 500))
-    plant.state[[V1, V2]] = rng.uniform(-2, 2, (2, 500))
-    seen, joints = plant.end_effector(), np.empty((4, 500))
-    piston_motion(seen, Rig(parameter_column(rig)), joints, 500)
-    np.testing.assert_allclose(joints, plant.state[[Y1, Y2, V1, V2]], rtol=0, atol=1e-13)
-    inverse = np.linalg.inv(np.moveaxis(geometry.jacobian(joints[:2], rig), 2, 0))
-    np.testing.assert_allclose(joints[2:], np.einsum("nij,jn->in", inverse, seen[2:]), rtol=0, atol=1e-12)
 
 
 @each_rig

@@ -8,17 +8,16 @@ import pytest
 from scipy.linalg import expm
 
 from birthsim_env import Parameters, Plant, balanced_pressures, linearize, linearize_lanes
-from birthsim_env.physics import control_model, geometry, valves
+from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linear.model import LinearModel
-from studies.accuracy.second_model import SecondModel, rates
 from studies.gradients.states import plant_of
 from tests.console import call, strict
-from tests.physics.test_second_model import ELASTO_PLASTIC, OTHER_RIG
+from tests.physics.rigs import OTHER
 
 COULOMB = {"friction.law": "coulomb"}
-RIGS = {"default": {}, "other": OTHER_RIG, "elasto-plastic": ELASTO_PLASTIC, "Coulomb": COULOMB}
+RIGS = {"default": {}, "other": OTHER, "elasto-plastic": {"friction.law": "elasto_plastic"}, "Coulomb": COULOMB}
 SCALES = np.array([*[0.1] * 4, *[1e-4] * 2, *[1e5, 300.0] * 4, *[1.0] * 8, 10.0, 10.0])
 """Size of each state, opening and force."""
 STEP = np.finfo(float).eps ** (1 / 3)
@@ -68,7 +67,7 @@ def test_a_stuck_model_is_the_plants_central_difference(name: str, openings: tup
 
 
 def test_a_sliding_model_is_a_plant_without_dry_friction() -> None:
-    rig = Parameters().replace(OTHER_RIG)
+    rig = Parameters().replace(OTHER)
     model = linearize(rig, pose_of(rig, 0.03, -0.07), friction="sliding", openings=(0.1, -0.2, 0.0, 0.02))
     smooth = rig.replace({**COULOMB, "cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
     kept = [at.STATE_NAMES.index(signal.name) for signal in model.states]
@@ -79,7 +78,7 @@ def test_a_sliding_model_is_a_plant_without_dry_friction() -> None:
 
 
 def test_outputs_are_the_jacobian_and_the_slope_of_9() -> None:
-    rig = Parameters().replace(OTHER_RIG)
+    rig = Parameters().replace(OTHER)
     piston = np.array([0.03, -0.07])
     model = linearize(rig, geometry.end_effector(piston, rig))
     jacobian = geometry.jacobian(piston, rig)
@@ -98,46 +97,6 @@ def test_outputs_are_the_jacobian_and_the_slope_of_9() -> None:
     assert_same(model.C[4:8], differences(forces, model.at.state, SCALES[:18]), SCALES[:18])
     np.testing.assert_allclose(model.at.outputs[4:8], forces(model.at.state), rtol=1e-12)
     np.testing.assert_array_equal(model.C[8:], np.eye(18)[list(at.PRESSURES)])
-
-
-@pytest.mark.parametrize("name", ["default", "other", "elasto-plastic"])
-def test_at_an_equilibrium_it_is_the_second_models(name: str) -> None:
-    """States s(x) of the second model obey T A = A2 T there, T = ds/dx; openings that hold the pressures make it one."""
-    rig = Parameters().replace(RIGS[name])
-    pose = pose_of(rig, -0.02, 0.05)
-    shut = linearize(rig, pose)
-    plant = Plant(rig)
-    p = plant.lane_parameters[:, 0]
-    coldness, law = p[at.COLDNESS], p[[at.RHO0, at.CRITICAL, at.KNEE, at.LAMINAR]]
-    hold = []
-    for pressure in shut.at.state[list(at.PRESSURES)]:
-        fill, drain = (
-            valves.driving_flow(up, 1 / up, coldness, down, 1 / down, coldness, *law)
-            for up, down in ((rig.air.supply_pressure, pressure), (pressure, rig.air.atmospheric_pressure))
-        )
-        hold.append(valves.opening_for_flow(0.0, fill, drain, p[at.CONDUCTANCE], p[at.LEAKAGE]))
-    model = linearize(rig, pose, openings=hold)
-    np.testing.assert_allclose(model.at.rates / SCALES[:18], 0.0, atol=1e-11)
-
-    def translated(states: Array) -> Array:
-        columns = []
-        for state in states.T:
-            plant.state[:, 0] = state
-            columns.append(SecondModel(rig, plant.end_effector()[:, 0], state).state)
-        return np.array(columns).T
-
-    x, u, f = model.at.state, model.at.openings, model.at.force
-    plant.state[:, 0] = x
-    second = SecondModel(rig, plant.end_effector()[:, 0], x)
-    size = np.array([*[0.1] * 4, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1.0] * 8, 10.0, 10.0])
-    to_second = differences(translated, x, SCALES[:18])
-
-    def second_rates(s: Array) -> Array:
-        return np.array([rates(c[:18], c[18:22], c[22:], *second.constants) for c in s.T.copy()]).T
-
-    both = differences(second_rates, np.concatenate([second.state, u, f]), size)
-    assert_same(to_second @ model.A, both[:, :18] @ to_second, SCALES[:18], 1e-7)
-    assert_same(to_second @ model.B, both[:, 18:], SCALES[18:])
 
 
 def test_along_a_trajectory_lanes_have_the_differences_of_their_plants() -> None:
@@ -182,53 +141,6 @@ def test_options_of_a_rig_have_their_states() -> None:
     expected = expm(duration * whole)[:31]
     still = np.eye(31, 37)
     assert_same((found - still) / duration, (expected - still) / duration, sizes, 1e-4)
-
-
-@pytest.mark.parametrize("friction", ["sliding", "stuck"])
-@pytest.mark.parametrize(("heat", "index"), [(0.0, "heat_capacity_ratio"), (40.0, None)], ids=["adiabatic", "isothermal"])
-def test_a_slow_hand_feels_the_stiffness_of_9(heat: float, index: str | None, friction: str) -> None:
-    """Tight valves, shut: J (K - d(J^T W)/dy)^-1 J^T, with K of (9) over chambers with their dead volume, at index gamma where
-    no heat is exchanged and 1 where all is; W is weight and hand. Stuck pistons add s0."""
-    heats = {"chambers.wall_heat_transfer": heat, "chambers.piston_conductance": 0.0}
-    rig = Parameters().replace({**OTHER_RIG, **heats, "valves.leakage_ratio": 0.0})
-    piston, hand = np.array([0.03, -0.07]), np.array([3.0, -5.0])
-    pose = geometry.end_effector(piston, rig)
-    model = linearize(rig, pose, force=hand, friction=friction)
-    n = getattr(rig.air, index) if index else 1.0
-    stiffness, pressures = [], model.at.outputs[8:].reshape(2, 2)
-    for c, y, (pp, pn) in zip((rig.cylinder1, rig.cylinder2), piston, pressures, strict=True):
-        lengths = [c.stroke / 2 + s * y + rig.chambers.dead_volume / area for s, area in ((1, c.area_p), (-1, c.area_n))]
-        stiffness.append(control_model.pneumatic_stiffness.py_func(pp, pn, c.area_p, c.area_n, *lengths, n))
-    load = model.at.force - [0.0, rig.mechanics.mass * rig.mechanics.gravity]
-    turning = differences(
-        lambda y: np.stack([geometry.joint_force(load, one, rig) for one in y.T], axis=1), piston, np.full(2, 0.1)
-    )
-    joint = np.diag(stiffness) - turning + (rig.friction.bristle_stiffness * np.eye(2) if friction == "stuck" else 0.0)
-    jacobian = geometry.jacobian(piston, rig)
-    expected = jacobian @ np.linalg.inv(joint) @ jacobian.T
-    # What inertia, damping and thermal lag add to the real part is quadratic in the frequency: (2 pi 1e-4 s)^2 = 4e-7.
-    found = model.frequency_response([1e-4])[0, :2, 4:].real
-    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
-
-
-def test_shut_spools_have_the_mean_gain_of_both_sides() -> None:
-    rig = Parameters()
-    pose = pose_of(rig, 0.03, -0.07)
-    shut, more, less = (linearize(rig, pose, openings=np.full(4, u)).A for u in (0.0, 1e-15, -1e-15))
-    np.testing.assert_allclose(shut, (more + less) / 2, rtol=1e-12, atol=1e-12)
-    state, air = linearize(rig, pose).at.state, rig.air
-    for row, spool, volume in (
-        (at.PP1, at.S1P, rig.chambers.dead_volume + rig.cylinder1.area_p * (0.1 + 0.03)),
-        (at.PN2, at.S2N, rig.chambers.dead_volume + rig.cylinder2.area_n * (0.2 + 0.07)),
-    ):
-        pressure = state[row]
-        gains = []
-        for up, down in ((air.supply_pressure, pressure), (pressure, air.atmospheric_pressure)):
-            x = (max(down / up, rig.valves.critical_ratio) - rig.valves.critical_ratio) / (1 - rig.valves.critical_ratio)
-            flow = rig.valves.sonic_conductance * air.reference_density * up * np.sqrt(1 - x * x)
-            gains.append(air.heat_capacity_ratio * air.gas_constant * air.temperature * flow / volume)
-        for model, gain in ((more, gains[0]), (less, gains[1]), (shut, sum(gains) / 2)):
-            assert model[row, spool] == pytest.approx(gain, rel=1e-12)
 
 
 def test_a_small_sine_moves_the_plant_as_the_frequency_response_says() -> None:

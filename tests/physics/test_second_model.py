@@ -10,20 +10,8 @@ from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
 from studies.accuracy.second_model import SecondModel
+from tests.physics.rigs import DEMANDING, LAWS, OTHER
 
-OTHER_RIG = {
-    **{"geometry.gamma3": 1.3, "geometry.d3": 0.4, "geometry.d6": 0.22, "geometry.k1": 0.44, "geometry.k2": 0.55},
-    **{"cylinder1.piston_diameter": 0.032, "cylinder2.rod_diameter": 0.012, "mechanics.mass": 4.0, "mechanics.gravity": 9.7},
-    **{"friction.static_ratio": 1.6, "friction.stribeck_speed": 0.01, "friction.bristle_damping": 90.0},
-    **{"chambers.dead_volume": 2e-5, "chambers.wall_heat_transfer": 80.0, "chambers.piston_conductance": 0.1},
-    **{"valves.critical_ratio": 0.4, "valves.time_constant": 0.003, "valves.leakage_ratio": 0.02},
-    **{"air.supply_pressure": 6e5, "air.temperature": 300.0, "air.atmospheric_pressure": 0.95e5},
-}
-DEMANDING_RIG = {
-    **{"cylinder1.coulomb_friction": 25.0, "cylinder2.coulomb_friction": 6.0, "mechanics.mass": 2.0},
-    **{"chambers.dead_volume": 5e-6, "chambers.wall_heat_transfer": 100.0, "valves.time_constant": 0.0015},
-}
-"""A corner of the ranges of domain randomisation: light, tight and quick, so that the integrator has least to spare."""
 ELASTO_PLASTIC = {"friction.law": "elasto_plastic"}
 LATE_BREAKAWAY = {**ELASTO_PLASTIC, "friction.breakaway_ratio": 0.9}
 
@@ -61,12 +49,12 @@ CASES = {
     # Position (m) and pressure (relative), about twice what was measured; the aim is 1e-7 and 1e-6.
     "default, stick-slip": ({}, stick_slip, 1, (2e-8, 1e-7)),
     "default, strong": ({}, strong, 1, (1e-7, 1e-6)),
-    "other rig, stick-slip": (OTHER_RIG, stick_slip, 1, (2e-8, 1e-7)),
-    "other rig, strong": (OTHER_RIG, strong, 1, (1e-7, 1e-6)),
-    "demanding rig, strong": (DEMANDING_RIG, strong, 1, (3e-7, 2e-6)),
+    "other rig, stick-slip": (OTHER, stick_slip, 1, (2e-8, 1e-7)),
+    "other rig, strong": (OTHER, strong, 1, (1e-7, 1e-6)),
+    "demanding rig, strong": (DEMANDING, strong, 1, (3e-7, 2e-6)),
     "elasto-plastic, stick-slip": (ELASTO_PLASTIC, stick_slip, 1, (5e-9, 3e-8)),
-    "elasto-plastic, other rig, strong": ({**OTHER_RIG, **LATE_BREAKAWAY}, strong, 1, (1.5e-7, 1e-6)),
-    "elasto-plastic, demanding rig, strong": ({**DEMANDING_RIG, **ELASTO_PLASTIC}, strong, 1, (1e-7, 1e-6)),
+    "elasto-plastic, other rig, strong": ({**OTHER, **LATE_BREAKAWAY}, strong, 1, (1.5e-7, 1e-6)),
+    "elasto-plastic, demanding rig, strong": ({**DEMANDING, **ELASTO_PLASTIC}, strong, 1, (1e-7, 1e-6)),
     "Coulomb, stick-slip": ({"friction.law": "coulomb"}, stick_slip, 1, (1e-7, 1e-6)),
     # The corners of sign(v) in (4) cost the default step more; smaller steps show that nothing else differs.
     "Coulomb, strong": ({"friction.law": "coulomb"}, strong, 1, (5e-6, 2e-5)),
@@ -88,7 +76,7 @@ def test_plant_moves_like_the_second_model(
         assert np.all(np.abs(speeds).max(axis=0) > [0.5, 0.7])
 
 
-@pytest.mark.parametrize("law", ["lugre", "coulomb", "elasto_plastic"])
+@pytest.mark.parametrize("law", LAWS)
 def test_fourth_order_where_the_motion_is_smooth(law: str) -> None:
     """No reversal, no spool through zero, no pressure ratio through 0.3 or 0.99: halving the step leaves 1/16 of the error."""
     rig = Parameters().replace({"friction.law": law})

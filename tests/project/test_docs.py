@@ -1,6 +1,7 @@
-"""The documentation site: every page has its place, the generated parts know everything, tables sort, and it builds."""
+"""The documentation site: pages have their places, generated parts know everything, tables sort, it builds, prose is read."""
 
 import csv
+import json
 import os
 import re
 import subprocess
@@ -16,9 +17,9 @@ from birthsim.door import COMMANDS
 from birthsim_env import Parameters
 from studies.comparison import tables as comparison_tables
 from studies.scores import tables as score_tables
+from tests.console import ROOT
 from tests.live import axe, browser
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 TABLES = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.md")}
 
@@ -72,12 +73,9 @@ def test_every_figure_of_an_explanation_stands_in_a_page_that_it_links(page):
 
 
 @pytest.fixture(scope="module")
-def parts():
+def parts(generated):
     """The generated parts of the site."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(DOCS)
-        import _generate
-    return {name: part() for name, part in _generate.PARTS.items()}
+    return {name: part() for name, part in generated("").PARTS.items()}
 
 
 def test_generated_parts_know_everything(parts):
@@ -145,13 +143,10 @@ def test_a_data_file_is_chosen_from_and_sorted(page_of):
     assert "4 of 4 rows" in page.locator("article").inner_text()
 
 
-def test_the_first_word_of_the_glossary_in_a_page_explains_itself(page_of):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(DOCS)
-        from _generate import words
-    script = (DOCS / "_static" / "glossary.js").read_text(encoding="utf-8")
+def test_the_first_word_of_the_glossary_in_a_page_explains_itself(page_of, generated):
+    script = generated(".words").script() + (DOCS / "_static" / "glossary.js").read_text(encoding="utf-8")
     text = "<article><p><a>Hunting</a> is hunting in a control period; hunting</p><h2>lane</h2></article>"
-    page = page_of(f"<!doctype html>{text}<script>{words.script()}{script}</script>")
+    page = page_of(f"<!doctype html>{text}<script>{script}</script>")
     marked = page.locator("abbr")
     assert marked.all_text_contents() == ["hunting", "control period"]
     assert marked.nth(1).get_attribute("title") == "1 ms: how often the controller runs."
@@ -174,10 +169,8 @@ def page_of(chromium):
 def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands_write():
     texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.csv")}
     columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
-    linked = {
-        Path(link).name for text in [*PAGES.values(), *TABLES.values()] for link in re.findall(r"\]\((data/[^)]+)\)", text)
-    }
-    assert set(columns) <= linked
+    text = "".join([*PAGES.values(), *TABLES.values()])
+    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((data/[^)]+)\)", text)}
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
     others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
     assert columns == compared | others
@@ -203,11 +196,11 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
     notebooks = [page for page, text in PAGES.items() if "{code-cell}" in text]
     assert len(notebooks) >= 5
     assert [page for page in notebooks if 'class="cell_output' not in (site / f"{page}.html").read_text("utf-8")] == []
-    tutorials = [page for page in notebooks if page.startswith("tutorials/")]
-    assert sorted(Path(page).name for page in tutorials) == sorted(file.stem for file in (site / "notebooks").iterdir())
-    for page in tutorials:
-        links = (site / f"{page}.html").read_text("utf-8").partition('<p class="notebook">')[2].partition("</p>")[0]
-        assert re.findall(r">(\w[^<]+)<", links) == ["Download this notebook", "Open in Colab", "Open in Binder"]
+    tutorials = [Path(page).name for page in notebooks if page.startswith("tutorials/")]
+    assert sorted(tutorials) == sorted(file.stem for file in (site / "notebooks").iterdir())
+    for name in tutorials:
+        links = re.search(r'<p class="notebook">.*?</p>', (site / "tutorials" / f"{name}.html").read_text("utf-8"), re.DOTALL)
+        assert re.findall(r">(\w[^<]+)<", links[0]) == ["Download this notebook", "Open in Colab", "Open in Binder"]
     assert (site / "rig" / "rig" / "loop.wasm").exists()
     landing = (site / "index.html").read_text("utf-8")
     assert 'src="rig/index.html' in landing
@@ -226,9 +219,9 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
 def test_axe_finds_nothing_on_the_site(site, page_of, theme):
     page = page_of("")
     page.emulate_media(color_scheme=theme)
-    with browser.Folder(site) as address:
+    with browser.Folder(site) as served:
         for name in ("index", "tutorials/first_episode", "comparison", "reference/environments", "reference/commands"):
-            page.goto(f"{address}{name}.html")
+            page.goto(f"{served.url}{name}.html")
             assert axe.violations(page, "iframe") == [], name
 
 
@@ -236,10 +229,25 @@ def test_axe_finds_nothing_on_the_site(site, page_of, theme):
 @axe.NEEDED
 def test_equations_are_drawn_from_a_file_of_the_site(site, page_of):
     page, drawn = page_of(""), "mjx-container:not(:has([data-mml-node=merror]))"
-    with browser.Folder(site) as address:
+    with browser.Folder(site) as served:
         for name in ("explanation/equations", "explanation/hand", "live"):
-            page.goto(f"{address}{name}.html")
+            page.goto(f"{served.url}{name}.html")
             written = page.locator(".math").count()
             assert written > 0, name
             page.wait_for_function(f"document.querySelectorAll('mjx-container').length == {written}")
             assert page.locator(drawn).count() == written, name
+
+
+TEXTLINT = ROOT / "out" / "npm" / "node_modules" / ".bin" / "textlint"
+UNREAD = "<!-- textlint-disable -->\n\nA title with set points.\n\n<!-- textlint-enable -->\n"
+CONFIGURATION = DOCS / "_prose" / ".textlintrc.js"
+
+
+@pytest.mark.skipif(not TEXTLINT.exists() and os.environ.get("CI") != "true", reason="make prose installs textlint")
+def test_other_names_and_long_sentences_are_found(tmp_path):
+    long = " ".join(["word"] * 45)
+    (tmp_path / "page.md").write_text(f"The `set point` is code.\n\nSet points have one name.\n\nA {long}.\n\n{UNREAD}")
+    command = [str(TEXTLINT), "--config", str(CONFIGURATION), "--format", "json", str(tmp_path / "page.md")]
+    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)[0]["messages"]
+    assert [(message["line"], message["ruleId"]) for message in told] == [(3, "terminology"), (5, "sentence-length")]
+    assert "use “Setpoints” instead" in told[0]["message"]

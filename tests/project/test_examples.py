@@ -3,13 +3,11 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from tests.build.targets import need_threads
-
-ROOT = Path(__file__).resolve().parent.parent.parent
+from tests.console import ROOT
 
 EXAMPLES = ("sb3_ppo", "cleanrl_ppo", "torchrl_ppo", "rllib_ppo", "device_ppo")
 

@@ -2,11 +2,10 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from tests.console import ROOT
 
 MAKE = "import gymnasium, birthsim_env; gymnasium.make{}('BirthSIM/CircleResidual-v1')"
 COMMAND = "import sys; sys.argv = ['birthsim', 'explain', '--help']; from birthsim.door import main; main()"

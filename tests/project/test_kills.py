@@ -27,14 +27,11 @@ def test_a_killed_export_goes_on(tmp_path):
 
 
 def test_files_that_are_torn_are_seen_and_hidden_ones_are_leftovers(tmp_path):
-    (tmp_path / "whole.json").write_text("{}")
-    (tmp_path / "torn.json").write_text('{"a": 1')
-    (tmp_path / "torn.svg").write_text("<svg><g>")
-    (tmp_path / "torn.png").write_bytes(b"\x89PNG")
-    (tmp_path / "torn.md").write_text("| a |")
-    (tmp_path / "trials.journal").write_text('{"a": 1}\n{"a"')
-    (tmp_path / ".whole.json.host-1.partial").write_text("{")
-    assert [line.partition(":")[0] for line in checks.broken(tmp_path)] == ["torn.json", "torn.md", "torn.png", "torn.svg"]
+    files = {"whole.json": "{}", "trials.journal": '{"a": 1}\n{"a"', ".whole.json.host-1.partial": "{"}
+    torn = {"torn.json": '{"a": 1', "torn.md": "| a |", "torn.png": "PNG", "torn.svg": "<svg><g>"}
+    for name, text in (files | torn).items():
+        (tmp_path / name).write_text(text)
+    assert [line.partition(":")[0] for line in checks.broken(tmp_path)] == list(torn)
     assert checks.leftovers(tmp_path) == [".whole.json.host-1.partial"]
 
 
@@ -55,9 +52,7 @@ def test_results_are_equal_but_for_what_may_differ(tmp_path):
 
 
 def test_progress_bars_are_no_complaints():
-    said = (
-        "BirthSIM: compiling numerical kernels\nepisodes:  50%|##   | 1/2 [00:18<00:18, 18.28s/piece]\rbirthsim-x: terminated\n"
-    )
+    said = "BirthSIM: compiling kernels\nepisodes:  50%|##   | 1/2 [00:18<00:18, 18.28s/piece]\rbirthsim-x: terminated\n"
     assert checks.said(said) == ["birthsim-x: terminated"]
 
 

@@ -1,13 +1,13 @@
-"""What README and the pages in docs/ say runs as it stands there, and every link leads somewhere."""
+"""What pages say runs as it stands there; every link, file and target of make that they name exists."""
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+from tests.console import ROOT
+
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def reader(page):
@@ -46,8 +46,10 @@ def test_the_own_controller_is_the_example_file():
 
 
 def test_linked_files_exist():
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     for page, text in TEXTS.items():
         links = [link for link in re.findall(r"\]\(([^)#]+)[^)]*\)", text) if "://" not in link]
         assert [link for link in links if not (reader(page) / link).exists()] == [], page
         named = re.findall(r"`((?:tests|examples|docs|agents|baselines|birthsim_(?:build|env|live))/[\w/.]+)`", text)
-        assert [name for name in named if not (ROOT / name).exists()] == [], page
+        assert page.stem == "CHANGELOG" or [name for name in named if not (ROOT / name).exists()] == [], page
+        assert {name for names in re.findall(r"`make ([a-z -]+)`", text) for name in names.split()} <= targets, page

@@ -1,7 +1,6 @@
 """What a user imports is importable from the packages, wherever it lives."""
 
 import ast
-import pathlib
 import subprocess
 import sys
 
@@ -10,7 +9,7 @@ import pytest
 import agents
 import baselines
 import birthsim_env
-import studies
+from tests.console import ROOT
 
 
 @pytest.mark.parametrize("package", [agents, baselines, birthsim_env])
@@ -35,21 +34,16 @@ def test_importing_a_package_loads_no_torch():
 
 def test_no_module_gives_a_name_twice():
     """A later constant or function of the same name would take the place of the first without a word."""
-    root, twice = pathlib.Path(__file__).parents[2], []
+    twice = []
     for package in ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live"):
-        for path in (root / package).rglob("*.py"):
+        for path in (ROOT / package).rglob("*.py"):
             named: set[str] = set()
             for node in ast.parse(path.read_text(encoding="utf-8")).body:
-                targets = node.targets if isinstance(node, ast.Assign) else [node] if hasattr(node, "name") else []
-                targets += [node.target] if isinstance(node, ast.AnnAssign) else []
-                names = [
-                    part.id if isinstance(part, ast.Name) else part.name
-                    for target in targets
-                    for part in (target.elts if isinstance(target, ast.Tuple) else [target])
-                    if isinstance(part, ast.Name) or hasattr(part, "name")
-                ]
-                twice += [f"{path.relative_to(root)}: {name}" for name in names if name in named]
-                named.update(names)
+                targets = [] if isinstance(node, ast.For) else getattr(node, "targets", [getattr(node, "target", node)])
+                parts = [part for target in targets for part in getattr(target, "elts", [target])]
+                names = [getattr(part, "id", getattr(part, "name", None)) for part in parts]
+                twice += [f"{path.relative_to(ROOT)}: {name}" for name in names if name in named]
+                named.update(filter(None, names))
     assert twice == []
 
 
@@ -90,12 +84,9 @@ def test_rows_by_number_are_found():
 
 
 def test_kernels_name_their_rows():
-    root, found = pathlib.Path(__file__).parents[2], []
-    packages = (birthsim_env, baselines, agents, studies)
-    for path in (
-        one for package in packages for one in (root / package.__name__).rglob("*.py") if one.parent.name != "__pycache__"
-    ):
-        place = path.relative_to(root).as_posix()
+    found = []
+    for path in (one for name in ("birthsim_env", "baselines", "agents", "studies") for one in (ROOT / name).rglob("*.py")):
+        place = path.relative_to(ROOT).as_posix()
         if place != HASH and "/physics/" not in place:
             found += [f"{place}: {row}" for row in rows_by_number(path.read_text(encoding="utf-8"))]
     assert found == []

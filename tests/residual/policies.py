@@ -10,25 +10,29 @@ from agents.policy.network import PolicyNetwork
 from agents.residual.law import observation_names
 from agents.residual.settings import ResidualSettings
 
-ENVIRONMENT = "BirthSIM/CircleResidual-v1"
+ENVIRONMENT = "BirthSIM/ProbeResidual-v2"
 SETTINGS = ResidualSettings("backstepping-weight", authority=33.0, time_constant=0.04, policy_period=0.02)
 INPUTS = len(observation_names(SETTINGS))
+TRAINING = {"steps": 7, "seed": 3, "curve": [{"steps": 0, "pooled_mm": 1.5}]}
 
 
-def network(inputs=INPUTS, outputs=2, hidden=(16, 8), seed=0, squashed=False, cells=0) -> PolicyNetwork:
-    """Random weights; with ``cells`` also a memory."""
+def network(inputs=INPUTS, outputs=2, hidden=(16, 8), seed=0, squashed=False, cells=0, reach=1.0) -> PolicyNetwork:
+    """Random weights, actions of about ``reach`` in size; with ``cells`` also a memory."""
     rng = np.random.default_rng(seed)
 
-    def layer(m, n):
-        return rng.normal(size=(n, m), scale=0.4).astype(np.float32), rng.normal(size=n, scale=0.1).astype(np.float32)
+    def layer(m, n, size=1.0):
+        weight, bias = rng.normal(size=(n, m), scale=size / np.sqrt(m)), rng.normal(size=n, scale=0.1 * size)
+        return weight.astype(np.float32), bias.astype(np.float32)
 
-    widths = (inputs, *hidden, outputs)
-    layers = [layer(m, n) for m, n in pairwise(widths)]
-    mean, variance = rng.normal(size=inputs), rng.uniform(0.1, 2, inputs)
-    memory = ()
-    if cells:
-        layers[-1], memory = layer(widths[-2] + cells, outputs), (layer(widths[-2], 3 * cells), layer(cells, 3 * cells))
-    return PolicyNetwork(mean, variance, tuple(layers), squashed, memory)
+    widths = (inputs, *hidden)
+    layers = *(layer(m, n) for m, n in pairwise(widths)), layer(widths[-1] + cells, outputs, reach)
+    memory = (layer(widths[-1], 3 * cells), layer(cells, 3 * cells)) if cells else ()
+    return PolicyNetwork(rng.normal(size=inputs, scale=0.3), rng.uniform(0.1, 2, inputs), layers, squashed, memory)
+
+
+def policy(settings=SETTINGS, **options) -> Policy:
+    """Of a random network that fits the settings."""
+    return Policy(network(len(observation_names(settings)), settings.size, **options), ENVIRONMENT, settings, TRAINING)
 
 
 class Trap:
@@ -41,7 +45,5 @@ class Trap:
         return (Path.touch, (self.path,))
 
 
-TRAINING = {"steps": 7, "seed": 3, "curve": [{"steps": 0, "pooled_mm": 1.5}]}
-POLICY = Policy(network(), ENVIRONMENT, SETTINGS, TRAINING)
-REMEMBERS = Policy(network(cells=5), ENVIRONMENT, SETTINGS, TRAINING)
+POLICIES = {"forward": policy(), "with a memory": policy(cells=5)}
 """Three layers, without and with a memory."""

@@ -3,12 +3,21 @@
 import numpy as np
 import pytest
 
-from agents.residual.authority import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING
-from birthsim_env.loop.signals import REFERENCES, Reference
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from agents.residual.authority import (
+    LEAST,
+    LEVEL,
+    MOST_SOFTENING,
+    RECOVERY,
+    SOFTENING,
+    SWING,
+    YIELDING,
+    Limiter,
+    limit_authority,
+)
+from birthsim_env.loop.signals import REFERENCES, Joints, Reference
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
-from tests.oracles.residual_parts import AuthorityLimiter
 
 PERIOD = 1e-3
 TIMES = PERIOD * np.arange(1500)
@@ -19,21 +28,20 @@ SIZES = [np.hypot(*by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k
 """Speed of the end effector per speed of each piston."""
 
 
-def new(lanes: int) -> AuthorityLimiter:
-    limiter = AuthorityLimiter(PERIOD, parameter_column(RIG))
-    limiter.reset(np.ones(lanes, dtype=np.bool_))
-    return limiter
+def new(lanes: int) -> Limiter:
+    return Limiter(np.repeat(Limiter.lane(left=1.0)[:, None], lanes, axis=1))
 
 
-def watched(limiter: AuthorityLimiter, speeds: Array, targets: Array | None = None) -> Array:
+def watched(limiter: Limiter, speeds: Array, targets: Array | None = None) -> Array:
     """The fractions (T, 2, N) while the pistons move with ``speeds`` (T, 2, N) at one place, the target with ``targets``."""
     fractions, lanes = [], speeds.shape[2]
     for k, speed in enumerate(speeds):
         rows = np.zeros((REFERENCES, lanes))
         if targets is not None:
             rows[2:4], _ = by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, *targets[k])
-        limiter.update(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]), Reference(rows))
-        fractions.append(limiter.fraction.copy())
+        joints = Joints(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]))
+        limit_authority(joints, Reference(rows), Rig(parameter_column(RIG)), PERIOD, LEVEL, limiter, lanes)
+        fractions.append(limiter.left.copy())
     return np.array(fractions)
 
 
@@ -85,19 +93,6 @@ def test_an_oscillation_that_the_target_asks_for_costs_nothing() -> None:
     np.testing.assert_array_equal(fraction[-1, :, 1], LEAST)
 
 
-def test_a_reset_gives_a_lane_its_authority_back_and_forgets_its_half_waves() -> None:
-    limiter, speeds = new(3), shaken([wave(2 * LEVEL)] * 3, 1)
-    watched(limiter, speeds)
-    limiter.reset(np.array([False, True, False]))
-    np.testing.assert_array_equal(limiter.fraction, [[1, 1, 1], [LEAST, 1, LEAST]])
-    after, fresh = watched(limiter, speeds), watched(new(1), speeds[:, :, :1])
-    np.testing.assert_array_equal(after[:, :, 1], fresh[:, :, 0])
-    np.testing.assert_array_equal(after[:, 1, [0, 2]], LEAST)
-    # Another number of lanes is a new start.
-    limiter.reset(np.ones(2, dtype=np.bool_))
-    np.testing.assert_array_equal(limiter.fraction, np.ones((2, 2)))
-
-
 def softness_of(waves: list[Array], cylinder: int) -> Array:
     """The softness (T, N) while the pistons are shaken so."""
     limiter, softness = new(len(waves)), []
@@ -120,9 +115,7 @@ def test_swings_take_stiffness_that_comes_back_in_time(cylinder: int) -> None:
     assert 1.5 * SOFTENING < softness.max() < MOST_SOFTENING
 
 
-def test_stiffness_is_taken_up_to_a_bound_and_given_back_by_a_reset() -> None:
+def test_stiffness_is_taken_up_to_a_bound() -> None:
     limiter = new(2)
     watched(limiter, shaken([wave(3 * SWING), wave(3 * SWING)], 0))
     assert np.all((limiter.softness > 0.9 * MOST_SOFTENING) & (limiter.softness <= MOST_SOFTENING))
-    limiter.reset(np.array([True, False]))
-    assert limiter.softness[0] == 0 < limiter.softness[1]

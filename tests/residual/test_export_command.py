@@ -9,7 +9,7 @@ import agents
 from agents.policy.controller import ResidualController
 from agents.policy.files import WEIGHTS, save_policy
 from tests.console import call
-from tests.residual.test_onnx_export import policy
+from tests.residual.policies import policy
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_pa
     status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder)
     assert (status, complaint) == (0, "")
     written = folder / "policy.onnx"
-    assert f"{written}: {written.stat().st_size} bytes, 36 observation entries to 4 actions" in printed
+    assert f"{written}: {written.stat().st_size} bytes, 32 observation entries to 2 actions" in printed
     assert "over 3000 observations" in printed
     assert re.search(r": \S+ from PyTorch, \S+ from NumPy; allowed: 1.19209e-07\n", printed)
     elsewhere = tmp_path / "new" / "folder" / "mine.onnx"

@@ -32,13 +32,6 @@ def test_a_network_is_normalization_tanh_layers_and_a_clip():
     assert actions.dtype == np.float32
 
 
-def test_a_squashed_network_ends_with_another_tanh():
-    weight, bias = np.array([[0.5, -2.0]], np.float32), np.array([0.25], np.float32)
-    hand = PolicyNetwork(np.zeros(2), np.ones(2), ((weight, bias),), squashed=True)
-    actions = hand.actions(np.array([[1.0, 0.5], [100.0, -100.0]], np.float32))
-    np.testing.assert_allclose(actions[:, 0], np.tanh([0.5 - 1 + 0.25, 5 + 20 + 0.25]), rtol=1e-6)
-
-
 def unit(torch_unit, hidden, inputs, outputs, seed=0):
     """A policy whose memory is a unit of PyTorch, in double precision, with weights that are singles."""
     made = network(inputs, outputs, (hidden,), seed, cells=torch_unit.hidden_size)
@@ -80,17 +73,6 @@ def test_a_memory_is_pytorchs_gated_recurrent_unit(squashed):
     assert np.ptp(memories, axis=0).max() > 0.5
 
 
-@pytest.mark.parametrize("cells", [0, 32])
-def test_a_lane_has_the_same_bits_alone_and_among_many(cells):
-    made = network(INPUTS, 2, (32,), 3, cells=cells)
-    seen = observations(40, 67, INPUTS)
-    together = made.acting()
-    every = np.array([together(rows) for rows in seen])
-    for lane in (0, 1, 31, 66):
-        alone = made.acting()
-        np.testing.assert_array_equal(np.array([alone(rows[lane : lane + 1])[0] for rows in seen]), every[:, lane])
-
-
 def test_a_reset_forgets_the_lanes_that_it_names():
     made = network(INPUTS, 2, (8,), 4, cells=6)
     seen, lanes = observations(30, 5, INPUTS, scale=0.3), np.array([False, True, False, False, True])
@@ -119,13 +101,3 @@ def test_after_a_reset_of_all_lanes_a_mask_of_another_number_counts(cells):
     act.reset()
     act.reset(np.array([True, False, False, True, False]))
     np.testing.assert_array_equal(act(seen[1]), made.acting()(seen[1]))
-
-
-def test_a_network_without_memory_acts_on_what_it_sees_alone():
-    made = network(INPUTS, 2, (8,), 5)
-    act, seen = made.acting(), observations(2, 3, INPUTS)
-    first = act(seen[0])
-    act(seen[1])
-    np.testing.assert_array_equal(act(seen[0]), first)
-    act.reset(np.array([True, False, False]))
-    np.testing.assert_array_equal(act(seen[0]), first)

@@ -12,7 +12,9 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import save_policy
 from agents.policy.onnx_export import TOLERANCE
 from birthsim_env import Parameters
-from tests.residual.test_onnx_export import ROOT, exported, policy
+from tests.console import ROOT
+from tests.residual.policies import policy
+from tests.residual.test_onnx_export import exported
 
 EXAMPLE = ROOT / "examples" / "onnx_policy.py"
 

@@ -10,33 +10,24 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from tests.residual.policies import ENVIRONMENT, INPUTS, POLICY, REMEMBERS, SETTINGS, Trap, network
+from tests.residual.policies import ENVIRONMENT, INPUTS, POLICIES, SETTINGS, Trap, network, policy
 
 
 @pytest.fixture
 def folder(tmp_path):
-    save_policy(POLICY, tmp_path / "policy")
+    save_policy(policy(), tmp_path / "policy")
     return tmp_path / "policy"
 
 
-@pytest.fixture
-def remembers(tmp_path):
-    save_policy(REMEMBERS, tmp_path / "remembers")
-    return tmp_path / "remembers"
+either = pytest.mark.parametrize("kind", POLICIES)
 
 
-def rewrite(folder, **changes):
-    """Change what is said about the arrays, and vouch for the result; None removes an entry."""
-    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
-    about = {name: value for name, value in {**about, **changes}.items() if value is not None}
-    (folder / WEIGHTS).write_bytes(sealed(arrays, about))
-
-
-def replace_arrays(folder, **changes):
-    """Change arrays (``_`` in a name stands for a dot; None removes one) and vouch for the result."""
-    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
-    arrays = {**arrays, **{name.replace("_", "."): value for name, value in changes.items()}}
-    (folder / WEIGHTS).write_bytes(sealed({name: value for name, value in arrays.items() if value is not None}, about))
+def rewrite(folder, arrays=None, about=None):
+    """Change arrays (``_`` in a name stands for a dot) and what is said about them, and vouch for the result; None removes."""
+    parts = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
+    changes = {name.replace("_", "."): value for name, value in (arrays or {}).items()}, about or {}
+    kept = [{**part, **new} for part, new in zip(parts, changes, strict=True)]
+    (folder / WEIGHTS).write_bytes(sealed(*({name: value for name, value in one.items() if value is not None} for one in kept)))
 
 
 def assert_refused(folder, message):
@@ -61,9 +52,9 @@ def test_a_folder_without_a_policy_is_named(tmp_path):
             assert repr(str(tmp_path / name)) in str(caught.value)
 
 
-@pytest.mark.parametrize("policy", [POLICY, REMEMBERS], ids=["forward", "with a memory"])
-def test_every_flipped_bit_is_noticed(folder, policy):
-    save_policy(policy, folder)
+@either
+def test_every_flipped_bit_is_noticed(folder, kind):
+    save_policy(POLICIES[kind], folder)
     content = (folder / WEIGHTS).read_bytes()
     # All of the header's bytes, and some of the arrays'.
     header = 8 + int.from_bytes(content[:8], "little")
@@ -79,9 +70,9 @@ def test_every_flipped_bit_is_noticed(folder, policy):
     )
 
 
-@pytest.mark.parametrize("policy", [POLICY, REMEMBERS], ids=["forward", "with a memory"])
-def test_a_file_that_is_cut_off_or_longer_is_noticed(folder, policy):
-    save_policy(policy, folder)
+@either
+def test_a_file_that_is_cut_off_or_longer_is_noticed(folder, kind):
+    save_policy(POLICIES[kind], folder)
     content = (folder / WEIGHTS).read_bytes()
     for part in (content[:-4], content[:20], b"", content + b"0", content[:200]):
         (folder / WEIGHTS).write_bytes(part)
@@ -105,26 +96,14 @@ def test_another_format_is_called_foreign(folder, form):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"settings": None},
-        {"training": None},
-        {"environment": None},
-        {"settings": {**SETTINGS.to_dict(), "authority": -1.0}},
-        {"settings": {**SETTINGS.to_dict(), "authority": "forty"}},
-        {"settings": {**SETTINGS.to_dict(), "time_constant": 0}},
-        {"settings": {**SETTINGS.to_dict(), "law": "pid"}},
-        {"settings": {**SETTINGS.to_dict(), "impedance": 3}},
-        {"settings": {**SETTINGS.to_dict(), "law": "none", "impedance": "variable"}},
+        *({name: None} for name in ("settings", "training", "environment", "squashed")),
+        *({"settings": {**SETTINGS.to_dict(), **wrong}} for wrong in ({"authority": -1.0}, {"law": "pid"}, {"unknown": 1})),
         {"settings": {"authority": 40.0, "smoothing": 0.3, "policy_period": 0.01, "weight_compensation": False}},
-        *({"squashed": wrong} for wrong in (None, "false", 3, [])),
-        {"settings": {**SETTINGS.to_dict(), "unknown": 1}},
-        {"settings": [1, 2]},
-        {"settings": 3},
-        {"training": 3},
-        {"training": "text"},
+        *({name: wrong} for name in ("settings", "training", "squashed") for wrong in ([1, 2], 3, "false")),
     ],
 )
 def test_a_configuration_with_a_wrong_or_missing_entry_is_refused(folder, changes):
-    rewrite(folder, **changes)
+    rewrite(folder, about=changes)
     assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 
@@ -132,64 +111,43 @@ def shape(*sizes, fill=0.1, dtype=np.float32):
     return np.full(sizes, fill, dtype)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"mean": None},
-        {"variance": None},
-        {"1_weight": None},
-        {"2_bias": None},
-        {"mean": shape(INPUTS - 1)},
-        {"variance": shape(INPUTS + 1)},
-        {"mean": shape(1, INPUTS), "variance": shape(1, INPUTS)},
-        {"mean": shape(0), "variance": shape(0), "0_weight": shape(16, 0)},
-        {"0_weight": shape(16, INPUTS - 1)},
-        {"0_weight": shape(INPUTS, 16)},
-        {"0_weight": shape(16 * INPUTS)},
-        {"0_bias": shape(15)},
-        {"0_bias": shape(16, 1)},
-        {"1_weight": shape(8, 17)},
+WRONG = {
+    "forward": [
+        *({name: None} for name in ("mean", "variance", "1_weight", "2_bias")),
+        {"mean": shape(INPUTS - 1, dtype=np.float64)},
+        {"mean": shape(1, INPUTS, dtype=np.float64), "variance": shape(1, INPUTS, dtype=np.float64)},
+        {"mean": shape(0, dtype=np.float64), "variance": shape(0, dtype=np.float64), "0_weight": shape(16, 0)},
+        *({"0_weight": shape(*sizes)} for sizes in ((16, INPUTS - 1), (INPUTS, 16), (16 * INPUTS,))),
+        *({"0_bias": shape(*sizes)} for sizes in ((15,), (16, 1))),
         {"3_weight": shape(2, 3), "3_bias": shape(2)},
         {"extra_weight": shape(2, 2)},
+        {name: None for name in ("0_weight", "1_weight", "2_weight")},
         {"variance": shape(INPUTS, fill=-0.1, dtype=np.float64)},
-    ]
-    + [{name: None for name in ("0_weight", "1_weight", "2_weight")}]
-    + [{"mean": shape(INPUTS, fill=bad, dtype=np.float64)} for bad in (np.nan, np.inf)]
-    + [{"variance": shape(INPUTS, fill=bad, dtype=np.float64)} for bad in (np.nan, np.inf)]
-    + [{"1_weight": shape(8, 16, fill=bad)} for bad in (np.nan, np.inf, -np.inf)]
-    + [{"2_bias": shape(2, fill=np.nan)}]
-    + [{"1_weight": shape(8, 16, dtype=kind)} for kind in (np.float64, np.float16, np.int32, np.bool_)]
-    + [{"mean": shape(INPUTS)}, {"variance": shape(INPUTS)}],
-)
-def test_arrays_that_are_no_network_are_refused(folder, changes):
-    replace_arrays(folder, **changes)
-    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"enters_weight": None},
-        {"own_weight": None},
-        {"own_bias": None},
-        {"enters_weight": None, "enters_bias": None},
+        *({name: shape(INPUTS, fill=bad, dtype=np.float64)} for name in ("mean", "variance") for bad in (np.nan, np.inf)),
+        *({"1_weight": shape(8, 16, fill=bad)} for bad in (np.nan, -np.inf)),
+        {"2_bias": shape(2, fill=np.nan)},
+        *({"1_weight": shape(8, 16, dtype=kind)} for kind in (np.float64, np.float16, np.int32, np.bool_)),
+        *({name: shape(INPUTS)} for name in ("mean", "variance")),
+    ],
+    "with a memory": [
+        *({name: None} for name in ("enters_weight", "own_weight", "own_bias")),
         {"enters_weight": None, "enters_bias": None, "own_weight": None, "own_bias": None},
         {"enters_weight": shape(15, 9)},
         {"enters_weight": shape(14, 8), "enters_bias": shape(14)},
         {"enters_weight": shape(0, 8), "enters_bias": shape(0), "own_weight": shape(0, 0), "own_bias": shape(0)},
-        {"own_weight": shape(15, 6)},
+        *({"own_weight": shape(*sizes)} for sizes in ((15, 6), (15,))),
         {"own_weight": shape(18, 5), "own_bias": shape(18)},
-        {"own_weight": shape(15)},
-        {"own_bias": shape(15, 1)},
         {"own_weight": shape(15, 5, fill=np.nan)},
-        {"enters_bias": shape(15, fill=np.inf)},
-        {"2_weight": shape(2, 8)},
-        {"2_weight": shape(2, 14)},
+        *({"2_weight": shape(2, size)} for size in (8, 14)),
     ],
-)
-def test_arrays_that_are_no_memory_are_refused(remembers, changes):
-    replace_arrays(remembers, **changes)
-    assert_refused(remembers, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
+}
+
+
+@pytest.mark.parametrize(("kind", "changes"), [(kind, changes) for kind, rows in WRONG.items() for changes in rows])
+def test_arrays_that_are_no_network_are_refused(folder, kind, changes):
+    save_policy(POLICIES[kind], folder)
+    rewrite(folder, changes)
+    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 
 @pytest.mark.parametrize(("inputs", "outputs"), [(22, 2), (INPUTS, 4), (INPUTS - 1, 3)])

@@ -4,7 +4,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-import agents
 from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, load_policy, save_policy
 from agents.policy.network import PolicyNetwork
@@ -13,20 +12,9 @@ from agents.residual.settings import ResidualSettings
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.observation import SIZE
+from tests.residual.policies import policy
 
-assert agents  # importing it registers the ids
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
-
-
-def random_network(inputs, outputs, reach=0.5, squashed=False, cells=0) -> PolicyNetwork:
-    """Two layers of random weights whose actions are about ``reach`` in size; with ``cells`` a memory between them."""
-    rng = np.random.default_rng(0)
-    sizes = (inputs, 12), (12 + cells, outputs), *(((12, 3 * cells), (cells, 3 * cells)) if cells else ())
-    first, last, *memory = (
-        (rng.normal(size=(n, m), scale=1 / np.sqrt(m)).astype(np.float32), np.zeros(n, np.float32)) for m, n in sizes
-    )
-    layers = first, (last[0] * np.float32(reach), last[1])
-    return PolicyNetwork(rng.normal(size=inputs, scale=0.1), rng.uniform(0.5, 2, inputs), layers, squashed, tuple(memory))
 
 
 SETTINGS = {
@@ -46,15 +34,15 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     # Valves that a policy drives at random soon slam the pistons into their stops: gently, then.
     reach = 0.05 if settings.law == "none" else 0.5
     squashed, cells = settings.impedance == "variable", 7 if settings.law == "backstepping-force-first" else 0
-    network = random_network(len(observation_names(settings)), settings.size, reach, squashed, cells)
-    save_policy(Policy(network, CIRCLE, settings, {}), tmp_path)
+    stored = policy(settings, hidden=(12,), squashed=squashed, cells=cells, reach=reach)
+    save_policy(stored, tmp_path)
     controller, steps, lanes = ResidualController(policy=tmp_path), 60, 5
     arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes}
     inside = gymnasium.make_vec(CIRCLE, **arguments, **settings.to_dict())
     outside = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
     observation, _ = inside.reset(seed=11)
     outside.reset(seed=11)
-    act = network.acting()
+    act = stored.network.acting()
     for _ in range(steps):
         actions = act(observation)
         observation, _, terminated, _, info = inside.step(actions)
@@ -76,9 +64,8 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
 
 def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
     rig = Parameters().replace({"mechanics.mass": 4.0, "geometry.d3": 0.36})
-    settings = ResidualSettings()
-    network = random_network(len(observation_names(settings)), 2)
-    save_policy(Policy(network, PROBE, settings, {}), tmp_path)
+    stored = policy(ResidualSettings(), reach=0.5)
+    save_policy(stored, tmp_path)
     inside = gymnasium.make_vec(PROBE, num_envs=2, parameters=rig)
     observation, _ = inside.reset(seed=1)
     states = []
@@ -90,7 +77,7 @@ def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
             outside.step(controller.command(outside.measurement, outside.reference).T)
         states.append(outside.simulation.plant.state)
     for _ in range(20):
-        observation, *_ = inside.step(network.actions(observation))
+        observation, *_ = inside.step(stored.network.actions(observation))
     np.testing.assert_array_equal(states[0], inside.simulation.plant.state)
     assert not np.array_equal(*states)
 

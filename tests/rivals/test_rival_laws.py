@@ -21,14 +21,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles.closed_loop import FRICTIONLESS
+from tests.physics.rigs import TILTED
 
 PERIOD = 1e-3
-TILTED = Parameters().replace(
-    {
-        "geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.2,
-        "cylinder1.viscous_friction": 55.0, "cylinder2.coulomb_friction": 22.0, "cylinder2.rod_diameter": 0.012,
-    }
-)  # fmt: skip
 
 
 def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, force_rate: Array | float = 0.0) -> Array:
@@ -79,9 +74,6 @@ def test_the_rate_of_the_needed_force_is_its_derivative() -> None:
     needed = prepared(joints(t), force(t), rig, 0.7, force_rate)
     ahead, behind = (prepared(joints(t + s), force(t + s), rig, 0.7)[:2] for s in (step, -step))
     np.testing.assert_allclose(needed[2:4], (ahead - behind) / (2 * step), rtol=1e-4, atol=0.02)
-
-
-# PID
 
 
 def test_pressure_setpoints_give_force_and_pneumatic_stiffness() -> None:
@@ -145,9 +137,6 @@ def test_pid_openings_step_by_step() -> None:
         np.testing.assert_allclose(openings, expected, atol=1e-9)
 
 
-# LQR
-
-
 @pytest.mark.parametrize("scale", [1.0, 2.3])
 def test_the_regulator_solves_the_riccati_equation(scale: float) -> None:
     """P from the closed loop's Lyapunov equation gives the same gains back (Kleinman 1968), and the loop is stable."""
@@ -181,7 +170,7 @@ def test_the_linear_model_is_the_control_model_about_rest() -> None:
 def test_the_schedule_covers_the_workspace_and_is_fine_enough() -> None:
     rig, tolerances = TILTED, np.array([4e-4, 3e-3, 0.2, 20.0])
     law = LinearQuadratic(rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)))
-    design = law._designs["lab"]
+    design = law._designs[True]
     low, step, table = design["lowest"], design["step"], design["table"]
     high = low + step * (lqr.SCHEDULE - 1)
     strokes = np.array(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 5))).reshape(2, -1)
@@ -193,9 +182,6 @@ def test_the_schedule_covers_the_workspace_and_is_fine_enough() -> None:
         place = (value - low) / step
         read = [lqr.scheduled.py_func(table, row, place) for row in range(4)]
         np.testing.assert_allclose(read, exact, rtol=2e-3)
-
-
-# On the control model
 
 
 def on_the_model(
@@ -290,6 +276,3 @@ def test_sliding_mode_reaches_its_layer_when_predicted_and_decays_there() -> Non
         assert -later == pytest.approx(inside, rel=0.15)
         assert np.all(size[tick:] <= layer)
     assert np.abs(error[-1]).max() < 2e-5
-
-
-# On the plant

@@ -38,16 +38,11 @@ def test_with_nothing_strange_it_is_the_second_model() -> None:
     np.testing.assert_allclose(stranger.air[0], second.pressures, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("odd", "extension", "factors"),
-    [
-        ({"friction_asymmetry": 0.3}, 0.0, (1.3, 0.7)),
-        # The wave is 0.1 m long: none in the middle, most a quarter of it outwards, least a quarter inwards.
-        ({"friction_wave": 0.3}, 0.0, (1.0, 1.0)),
-        ({"friction_wave": 0.3}, 0.025, (1.3, 1.3)),
-        ({"friction_wave": 0.3}, -0.025, (0.7, 0.7)),
-    ],
-)
+# The wave is 0.1 m long: none in the middle, most a quarter of it outwards, least a quarter inwards.
+WAVE = [({"friction_wave": 0.3}, 0.025 * way, (1 + 0.3 * way,) * 2) for way in (0, 1, -1)]
+
+
+@pytest.mark.parametrize(("odd", "extension", "factors"), [({"friction_asymmetry": 0.3}, 0.0, (1.3, 0.7)), *WAVE])
 def test_friction_is_that_of_a_rig_with_so_much_of_it(odd, extension, factors) -> None:
     names = ("cylinder1.coulomb_friction", "cylinder2.coulomb_friction")
     levels = (TIGHT.cylinder1.coulomb_friction, TIGHT.cylinder2.coulomb_friction)

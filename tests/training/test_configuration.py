@@ -1,4 +1,4 @@
-"""Configurations of trainings: those that come with the package, one's own, and what is unknown or impossible by name."""
+"""Configurations of trainings: those that come with the package, one's own, and ranges that reach further in training."""
 
 import json
 import tomllib
@@ -9,12 +9,12 @@ import pytest
 import torch
 import yaml
 
-import agents
 from agents.residual.settings import ResidualSettings
-from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration, override
+from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration
+from agents.training.margin import widened
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-
-assert agents  # importing it registers the ids
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 def test_there_is_a_configuration_for_every_scenario():
@@ -64,19 +64,6 @@ def test_a_file_of_ones_own_says_only_what_differs(tmp_path):
     assert load_configuration("probe")[0].steps != 7
 
 
-@pytest.mark.parametrize("name", ["square", "circle.toml", "nowhere/circle", ""])
-def test_a_configuration_that_is_not_there_is_refused_with_those_that_are(name):
-    with pytest.raises(ValueError, match=r"is no file.*; allowed: circle, .*vacuum.*, or a TOML file") as caught:
-        load_configuration(name)
-    assert repr(name or ".") in str(caught.value) or repr(name) in str(caught.value)
-
-
-def test_overriding_changes_what_is_named():
-    settings = override(TrainingSettings(), steps=9, algorithm="tqc")
-    assert (settings.steps, settings.algorithm) == (9, "tqc")
-    assert override(settings) == settings
-
-
 RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))
 
 
@@ -107,3 +94,21 @@ def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
         assert zoo["env_kwargs"].get(key, getattr(ResidualSettings(), key)) == value
     env = gymnasium.make(training.environment, **zoo["env_kwargs"])
     assert env.action_space.shape == (residual.size,)
+
+
+MASSES, SLOWEST = (2.0, 5.0), 0.008
+"""kg; s: what ``Mechanics.mass`` and ``Valves.time_constant`` document."""
+
+
+def test_ranges_reach_further_on_one_side() -> None:
+    known, wide = documented_ranges(Parameters()), documented_ranges(widened(Parameters(), 0.5))
+    assert wide["mechanics.mass"] == pytest.approx((MASSES[0] / 1.5, MASSES[1]))
+    assert wide["valves.time_constant"] == pytest.approx((0.0015, 1.5 * SLOWEST))
+    assert {name for name in known if wide[name] == known[name]} == {"chambers.dead_volume", "chambers.wall_heat_transfer"}
+
+
+def test_an_owners_own_ranges_count() -> None:
+    rig = Parameters.from_dict({"randomize": {"mechanics.mass": [7.0, 10.0], "air.supply_pressure": [6e5, 7e5]}})
+    ranges = documented_ranges(widened(rig, 0.25))
+    assert ranges["mechanics.mass"] == (7.0 / 1.25, 10.0)
+    assert ranges["air.supply_pressure"] == (6e5, 7e5)

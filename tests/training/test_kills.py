@@ -1,6 +1,5 @@
 """Trainings that die: they go on, and end with the policy and the curve of one that never did."""
 
-import json
 import signal
 import subprocess
 import sys
@@ -8,13 +7,11 @@ import time
 from dataclasses import replace
 from itertools import pairwise
 
-import gymnasium
 import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor, reached
-from agents.training import trainer as training
 from agents.training.checkpoint import NAME, save_checkpoint
 from agents.training.trainer import train
 from tests.console import PATIENCE, ROOT, run, strict
@@ -23,102 +20,62 @@ from tests.training.brief import TINY, steady
 RESIDUAL = ResidualSettings("backstepping-force-first", "variable_kp")
 
 
-@pytest.fixture
-def brief(monkeypatch):
-    """Episodes of 1.2 seconds: some are settled, some end within a training."""
-    make_vec = gymnasium.make_vec
-    monkeypatch.setattr(training.gymnasium, "make_vec", lambda *args, **more: make_vec(*args, **{"duration": 1.2, **more}))
-
-
 class Killed(Exception):
     """Nobody catches it."""
 
 
-def killed(monkeypatch, settings, folder, method, count):
-    """Train until a method of the monitor is entered for the ``count``-th time; the steps that are done by then."""
-    calls, own = [], getattr(monitor.Monitor, method)
+def killed(monkeypatch, settings, folder, place, name, count):
+    """Train until a method of the monitor is entered, or a file is written, for the ``count``-th time."""
+    calls, own = [], getattr(place, name)
 
-    def die(self, *args):
-        calls.append(self.num_timesteps)
+    def die(*args):
+        calls.append(own(*args) if name.startswith("save") or len(calls) + 1 < count else None)
         if len(calls) == count:
             raise Killed
-        return own(self, *args)
+        return calls[-1]
 
     with monkeypatch.context() as patch:
-        patch.setattr(monitor.Monitor, method, die)
+        patch.setattr(place, name, die)
         with pytest.raises(Killed):
             train(settings, RESIDUAL, folder)
-    return calls[-1]
 
 
-STEP, CHECK, ROLLOUT = "_on_step", "_check", "_on_rollout_start"
-
-
+STEP, CHECK, ROLLOUT = ((monitor.Monitor, name) for name in ("_on_step", "_check", "_on_rollout_start"))
+FILES = [(monitor, "save_checkpoint", 2), (reached, "save_policy", 2)]
 SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
     ("changes", "places"),
     [
-        pytest.param({}, [(STEP, 1), (STEP, 70), (STEP, 127), (CHECK, 2), (CHECK, 5), (ROLLOUT, 5)], marks=SLOW, id="ppo"),
-        pytest.param({}, [(STEP, 70), (CHECK, 5)], id="ppo, two deaths"),
-        pytest.param({"sensors": "lab", "environment": "BirthSIM/CircleResidual-v1"}, [(CHECK, 5)], marks=SLOW, id="ppo lab"),
+        pytest.param({}, [(*STEP, 1), (*STEP, 127), (*CHECK, 2), (*ROLLOUT, 5), *FILES], marks=SLOW, id="ppo"),
+        pytest.param({}, [(*STEP, 70), (*CHECK, 5)], id="ppo, two deaths"),
+        pytest.param({"sensors": "lab", "environment": "BirthSIM/CircleResidual-v1"}, [(*CHECK, 5)], marks=SLOW, id="ppo lab"),
         # The first 160 steps are drawn from the space of actions.
-        pytest.param({"algorithm": "sac", "steps": 384}, [(STEP, 10), (STEP, 40), (CHECK, 4)], marks=SLOW, id="sac"),
-        pytest.param({"algorithm": "tqc", "steps": 256}, [(STEP, 30)], marks=SLOW, id="tqc"),
+        pytest.param({"algorithm": "sac", "steps": 384}, [(*STEP, 10), (*STEP, 40), (*CHECK, 4)], marks=SLOW, id="sac"),
+        pytest.param({"algorithm": "tqc", "steps": 256}, [(*STEP, 30)], marks=SLOW, id="tqc"),
     ],
 )
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("short_probe")
 def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(tmp_path, monkeypatch, capsys, changes, places):
+    """The checkpoint holds the best policy: whichever file is the newer one, the training ends as it would have."""
     settings = replace(TINY, **changes)
     expected = train(settings, RESIDUAL, tmp_path / "whole")
     policy = (tmp_path / "whole" / WEIGHTS).read_bytes()
-    for k, (method, count) in enumerate(places):
+    for k, place in enumerate(places):
         folder = tmp_path / str(k)
-        killed(monkeypatch, settings, folder, method, count)
+        killed(monkeypatch, settings, folder, *place)
+        (folder / WEIGHTS).unlink(missing_ok=True)
         capsys.readouterr()
-        reached = train(settings, RESIDUAL, folder)
+        ended = train(settings, RESIDUAL, folder)
         assert "steps are there and are kept" in capsys.readouterr().out
         assert (folder / WEIGHTS).read_bytes() == policy
-        assert steady(reached["curve"]) == steady(expected["curve"])
-        assert steady([reached["law"], reached["policy"]]) == steady([expected["law"], expected["policy"]])
-        assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(reached["curve"]))
+        assert steady(ended["curve"]) == steady(expected["curve"])
+        assert steady([ended["law"], ended["policy"]]) == steady([expected["law"], expected["policy"]])
+        assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(ended["curve"]))
 
 
-@pytest.mark.usefixtures("brief")
-def test_one_that_dies_again_and_again_gets_there_as_well(tmp_path, monkeypatch):
-    expected = train(TINY, RESIDUAL, tmp_path / "whole")
-    for _ in range(3):
-        killed(monkeypatch, TINY, tmp_path / "cut", "_on_step", 40)
-    reached = train(TINY, RESIDUAL, tmp_path / "cut")
-    assert steady(reached["curve"]) == steady(expected["curve"])
-    assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("brief")
-@pytest.mark.parametrize(("module", "name"), [(monitor, "save_checkpoint"), (reached, "save_policy")])
-def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, module, name):
-    """The checkpoint holds the best policy: whichever file is the newer one, the training ends as it would have."""
-    expected, saves = train(TINY, RESIDUAL, tmp_path / "whole"), []
-    own = getattr(module, name)
-
-    def dies(*args):
-        saves.append(own(*args))
-        if len(saves) == 2:
-            raise Killed
-
-    with monkeypatch.context() as patch:
-        patch.setattr(module, name, dies)
-        with pytest.raises(Killed):
-            train(TINY, RESIDUAL, tmp_path / "cut")
-    (tmp_path / "cut" / WEIGHTS).unlink()
-    reached = train(TINY, RESIDUAL, tmp_path / "cut")
-    assert steady(reached["curve"]) == steady(expected["curve"])
-    assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
-
-
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("short_probe")
 def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, monkeypatch, capsys):
     def interrupted(*args):
         save_checkpoint(*args)
@@ -129,14 +86,6 @@ def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, 
         train(TINY, RESIDUAL, tmp_path)
     assert "interrupted after 0 steps: policy and checkpoint are kept in " in capsys.readouterr().out
     assert load_policy(tmp_path).settings == RESIDUAL
-
-
-@pytest.mark.usefixtures("brief")
-def test_a_training_that_is_over_is_not_trained_any_further(tmp_path):
-    reached = train(TINY, RESIDUAL, tmp_path)
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
-    assert json.dumps(train(TINY, RESIDUAL, tmp_path)) == json.dumps(reached)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
 CONFIGURATION = """[training]

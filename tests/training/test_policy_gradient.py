@@ -2,14 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import policy_gradient
-from agents.training.configuration import TrainingSettings, load_configuration
+from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
 
 SHORT = TrainingSettings(
@@ -59,24 +58,3 @@ def test_a_killed_training_ends_with_the_same_policy(
     # It went on from the validation half way.
     assert updates[60] == training.steps // 2
     assert (tmp_path / "killed" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
-
-
-def test_what_it_cannot_differentiate_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"privileged.*apg.*allowed"):
-        replace(SHORT, privileged=True)
-    assert load_configuration("circle_apg")[0].algorithm == "apg"
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ({"target": "wall"}, r"target = 'wall'; allowed: 'spring', 'impedance'"),
-        ({"target": "impedance", "algorithm": "ppo"}, r"target = 'impedance' with algorithm = 'ppo'; allowed: 'spring'"),
-        ({"beside": ("BirthSIM/ProbeResidual-v2",), "algorithm": "sac"}, r"beside = .* with algorithm = 'sac'; allowed: \(\)"),
-        ({"beside": 3}, r"beside = 3; allowed: ids of residual environments"),
-        ({"beside": ("a", "b")}, r"lanes = 32; allowed: a multiple of 3"),
-    ],
-)
-def test_what_it_is_to_aim_at_and_where_is_refused_by_name(values: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        replace(SHORT, **values)

@@ -1,14 +1,17 @@
-"""Stable-Baselines3's view of a native vector environment: the same rollouts, and ends as its own wrappers report them."""
+"""Stable-Baselines3's view of a native vector environment: the same rollouts, ends as its own wrappers report them; and what
+wrappers of ours change: a learner's shifted rewards are the same problem, a privileged one sees the true figures."""
 
 import gymnasium
 import numpy as np
 import pytest
-import torch
-from stable_baselines3 import PPO
+from gymnasium import spaces
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv
 
+from agents.residual.privileged import FIGURES, true_figures
+from agents.training.privileged import Privileged
 from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.shifted_reward import ShiftedReward
 
 PROBE, RESIDUAL = "BirthSIM/Probe-v2", "BirthSIM/CircleResidual-v1"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)
@@ -30,72 +33,27 @@ def seeded(env, seed):
     return env.reset()
 
 
-def random_actions(steps, lanes=3, size=2, seed=0):
-    return np.random.default_rng(seed).uniform(-1, 1, (steps, lanes, size)).astype(np.float32)
-
-
-def test_rollouts_are_those_of_the_native_environment_through_several_episodes():
-    env, base = adapted(), native()
-    np.testing.assert_array_equal(seeded(env, 4), base.reset(seed=4)[0])
-    ends = np.zeros((2, 3), int)
-    returns, lengths = np.zeros(3), np.zeros(3, int)
+def test_rollouts_and_ends_are_those_of_stable_baselines_own_vectorization():
+    env, own = adapted(), DummyVecEnv([lambda: Monitor(gymnasium.make(PROBE, duration=0.6, randomize=True))] * 3)
+    np.testing.assert_array_equal(seeded(env, 4), seeded(own, 4))
+    ends = set()
     for _ in range(150):
         observation, rewards, dones, infos = env.step(SLAM)
-        expected, paid, terminated, truncated, info = base.step(SLAM)
+        expected, paid, ended, theirs = own.step(SLAM)
         np.testing.assert_array_equal(observation, expected)
-        np.testing.assert_array_equal(rewards, paid.astype(np.float32))
-        np.testing.assert_array_equal(dones, terminated | truncated)
-        returns += paid
-        lengths += 1
-        for lane in range(3):
+        np.testing.assert_array_equal(rewards, paid)
+        np.testing.assert_array_equal(dones, ended)
+        for lane, (info, its) in enumerate(zip(infos, theirs, strict=True)):
             if not dones[lane]:
-                assert infos[lane] == {}
+                assert info == {}
                 continue
-            ends[int(truncated[lane]), lane] += 1
-            assert set(infos[lane]) == {"terminal_observation", "TimeLimit.truncated", "episode", "is_success"}
-            np.testing.assert_array_equal(infos[lane]["terminal_observation"], info["final_obs"][lane])
-            assert not np.array_equal(infos[lane]["terminal_observation"], observation[lane])
-            assert infos[lane]["TimeLimit.truncated"] is bool(truncated[lane])
-            assert infos[lane]["episode"] == {"r": pytest.approx(returns[lane]), "l": lengths[lane]}
-            returns[lane] = lengths[lane] = 0
-    # Row 0: terminated, row 1: truncated.
-    assert ends[0, 0] >= 3
-    np.testing.assert_array_equal(ends[:, 1:], [[0, 0], [2, 2]])
-
-
-def test_ends_are_reported_as_by_stable_baselines_own_vectorization():
-    env = adapted(lanes=1, randomize=False)
-    own = DummyVecEnv([lambda: Monitor(gymnasium.make(PROBE, duration=0.6))])
-    np.testing.assert_array_equal(seeded(env, 4), seeded(own, 4))
-    for action in (SLAM[:1], SLAM[1:2]):
-        for _ in range(130):
-            observation, reward, done, (info,) = env.step(action)
-            expected, paid, end, (its,) = own.step(action)
-            np.testing.assert_array_equal(reward, paid)
-            np.testing.assert_array_equal(done, end)
-            if end[0]:
-                np.testing.assert_array_equal(info["terminal_observation"], its["terminal_observation"])
-                assert info["TimeLimit.truncated"] == its["TimeLimit.truncated"]
-                # Monitor rounds the return to six digits.
-                assert info["episode"]["r"] == pytest.approx(its["episode"]["r"], abs=1e-6)
-                assert info["episode"]["l"] == its["episode"]["l"]
-                break
-            np.testing.assert_array_equal(observation, expected)
-        assert end[0]
-        np.testing.assert_array_equal(seeded(env, 6), seeded(own, 6))
-
-
-def test_spaces_are_those_of_one_lane():
-    env, base = adapted(RESIDUAL, lanes=5), native(RESIDUAL, lanes=5)
-    assert env.num_envs == 5
-    assert env.observation_space == base.single_observation_space
-    assert env.action_space == base.single_action_space
-    observation = env.reset()
-    assert observation.shape == (5, 32)
-    assert observation.dtype == np.float32
-    _, rewards, dones, infos = env.step(np.zeros((5, 2), np.float32))
-    assert rewards.shape == dones.shape == (5,)
-    assert (rewards.dtype, dones.dtype, len(infos)) == (np.float32, np.bool_, 5)
+            assert set(info) == {"terminal_observation", "TimeLimit.truncated", "episode", "is_success"}
+            np.testing.assert_array_equal(info["terminal_observation"], its["terminal_observation"])
+            assert (info["TimeLimit.truncated"], info["is_success"]) == (its["TimeLimit.truncated"], its["is_success"])
+            # Monitor rounds the return to six digits.
+            assert info["episode"] == {"r": pytest.approx(its["episode"]["r"], abs=1e-6), "l": its["episode"]["l"]}
+            ends.add((lane, info["TimeLimit.truncated"]))
+    assert ends == {(0, False), (1, True), (2, True)}
 
 
 def test_a_seed_counts_for_one_reset_and_the_next_episode_differs():
@@ -153,18 +111,6 @@ def test_a_vector_environment_that_resets_one_step_later_is_refused(mode):
     env.close()
 
 
-def test_one_that_resets_within_the_step_is_taken_whoever_made_it():
-    mode = {"autoreset_mode": gymnasium.vector.AutoresetMode.SAME_STEP}
-    env = SB3VecEnv(gymnasium.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync", vector_kwargs=mode))
-    seeded(env, 0)
-    lengths = []
-    for _ in range(60):
-        infos = env.step(np.array([0, 1]))[3]
-        lengths += [info["episode"]["l"] for info in infos if info]
-    assert lengths
-    assert max(lengths) < 15
-
-
 def test_frames_come_from_the_lanes(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     env = adapted(RESIDUAL, lanes=2, render_mode="rgb_array")
@@ -178,16 +124,62 @@ def test_frames_come_from_the_lanes(monkeypatch):
     assert silent.get_images() == [None, None]
 
 
-def test_normalization_and_ppo_run_on_it():
-    torch.set_num_threads(1)  # two threads on small matrices mostly wait for each other
-    env = VecNormalize(adapted(lanes=4), gamma=0.9)
-    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
-    before = model.policy.action_net.weight.detach().clone()
-    model.learn(512)
-    assert model.num_timesteps == 512
-    assert env.venv.seconds > 0
-    assert not np.array_equal(before, model.policy.action_net.weight.detach())
-    # 128 steps of 4 lanes with at most 60 in an episode: at least two ends in each.
-    assert len(model.ep_info_buffer) >= 8
-    assert all(1 <= episode["l"] <= 60 for episode in model.ep_info_buffer)
-    assert np.isfinite([episode["r"] for episode in model.ep_info_buffer]).all()
+EPISODES = [([1.0, 0.5, 0.25], False), ([0.25], False), ([0.0] * 40, False), ([1.0, 0.75, 0.5], True)]
+"""Rewards, and whether the end is one of time, after which the last value goes on."""
+
+
+class Told(gymnasium.Env):
+    """Pays what it is told."""
+
+    observation_space = action_space = spaces.Box(-1, 1, (1,))
+
+    def __init__(self, rewards, truncated):
+        self.rewards, self.truncated, self.steps = rewards, truncated, 0
+
+    def reset(self, *, seed=None, options=None):
+        self.steps = 0
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):
+        self.steps += 1
+        ended = self.steps == len(self.rewards)
+        paid = self.rewards[self.steps - 1]
+        return np.zeros(1, np.float32), paid, ended and not self.truncated, ended and self.truncated, {}
+
+
+def told(rewards, truncated):
+    return DummyVecEnv([lambda: Told(rewards, truncated)])
+
+
+@pytest.mark.parametrize("discount", [0.9, 0.96, 0.999])
+@pytest.mark.parametrize(("rewards", "truncated"), EPISODES)
+def test_every_value_is_less_by_the_same(rewards, truncated, discount):
+    env = ShiftedReward(told(rewards, truncated), 0.5, discount)
+    env.reset()
+    paid = [float(env.step(np.zeros((1, 1)))[1][0]) for _ in rewards]
+    weights = discount ** np.arange(len(rewards))
+    less = 0.5 / (1 - discount)
+    # After an end of time a learner goes on with its own estimate, which is shifted as all values are.
+    beyond = -less * discount ** len(rewards) if truncated else 0.0
+    assert weights @ paid + beyond == pytest.approx(weights @ rewards - less, rel=1e-5)
+
+
+def test_every_observation_has_the_figures_of_its_own_episode():
+    lanes = gymnasium.make_vec(
+        "BirthSIM/ProbeResidual-v2", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
+    )  # fmt: skip
+    env = Privileged(SB3VecEnv(lanes, staggered=True))
+    env.seed(0)
+    seen, ends = env.reset(), 0
+    assert seen.shape == (4, *env.observation_space.shape)
+    for _ in range(12):
+        before = seen[:, -FIGURES:]
+        seen, _, ended, infos = env.step(np.zeros((4, 2), np.float32))
+        np.testing.assert_array_equal(seen[:, -FIGURES:], true_figures(lanes))
+        assert (seen[~ended, -FIGURES:] == before[~ended]).all()
+        for lane in np.flatnonzero(ended):
+            np.testing.assert_array_equal(infos[lane]["terminal_observation"][-FIGURES:], before[lane])
+            assert (seen[lane, -FIGURES:] != before[lane]).any()
+            ends += 1
+    assert ends >= 8
+    env.close()

@@ -16,7 +16,6 @@ from agents.training.configuration import TrainingSettings
 from agents.training.student import Student, _learn
 from agents.training.trainer import train
 from baselines.commands.command import perform_with
-from tests.console import call
 
 
 def test_a_student_finds_from_the_past_what_it_is_not_told():
@@ -93,15 +92,6 @@ def test_every_teacher_gets_a_student_that_is_a_policy(tmp_path, teachers, told)
         assert [point["steps"] for point in curve["curve"]] == [0, 4 * 700]
     told(*brief, "--seed", 1, "--out", tmp_path / "one")
     assert (tmp_path / "one" / "seed_1" / WEIGHTS).read_bytes() == (folders[1] / WEIGHTS).read_bytes()
-
-
-@pytest.mark.slow
-def test_students_are_judged_beside_their_law(tmp_path, teachers, told, monkeypatch, capsys):
-    told("--teacher", teachers, "--rounds", 1, "--hidden", 3, "--seeds", 2, "--out", tmp_path)
-    options = ("--policy", tmp_path, "--episodes", 1, "--rigs", 1, "--out", tmp_path / "out")
-    status, printed, _ = call("beside-law", monkeypatch, capsys, *options)
-    assert status == 0
-    assert "| seed_1 |" in printed
 
 
 @pytest.mark.slow

@@ -1,5 +1,8 @@
 """Residual training: it starts as the law, repeats itself bit for bit, gets better than the law, and keeps what was best."""
 
+import errno
+import os
+import threading
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,17 +12,19 @@ import pytest
 
 from agents.policy.controller import ResidualController
 from agents.policy.files import WEIGHTS, load_policy
+from agents.residual.privileged import FIGURES
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor, validation
 from agents.training import reached as reached_module
 from agents.training import trainer as training
 from agents.training.configuration import TrainingSettings
+from agents.training.margin import widened
 from agents.training.trainer import train
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
-from tests.training.brief import steady, zero
+from tests.training.brief import steady
 
 PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
@@ -29,7 +34,6 @@ SMALL = TrainingSettings(
 )  # fmt: skip
 """On 4.5 s of the stiffness test, a few seconds are enough to take a third off the law's error."""
 BRIEF = replace(SMALL, steps=2048, lanes=16, validation_lanes=4, validations=2)
-ROLLOUT = 16 * 32
 
 
 @pytest.fixture(scope="module")
@@ -39,40 +43,6 @@ def trained(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(training.gymnasium, "make_vec", lambda *args, **kwargs: make_vec(*args, **{"duration": 4.5, **kwargs}))
         return folder, train(SMALL, RESIDUAL, folder)
-
-
-def rollout(env, act, seed):
-    """Rewards (T, N) and positions (T, N, 2) of one episode of every lane."""
-    observation, _ = env.reset(seed=seed)
-    rewards, positions = [], []
-    for _ in range(env.steps):
-        observation, reward, _, _, info = env.step(act(observation))
-        rewards.append(reward)
-        positions.append(info["position"])
-    return np.array(rewards), np.array(positions)
-
-
-def test_before_training_the_policy_is_the_law(tmp_path, monkeypatch, short_probe):
-    networks, take = [], monitor.network_of
-
-    def spied(*args):
-        networks.append(take(*args))
-        return networks[-1]
-
-    monkeypatch.setattr(monitor, "network_of", spied)
-    reached = train(BRIEF, RESIDUAL, tmp_path)
-    first, last = networks[0], networks[-1]
-    env = gymnasium.make_vec(PROBE, num_envs=6, randomize=True, duration=1.0)
-    law, untrained, after = (rollout(env, act, 3) for act in (zero, first.acting(), last.acting()))
-    for expected, actual, moved in zip(law, untrained, after, strict=True):
-        np.testing.assert_array_equal(actual, expected)
-        assert not np.array_equal(moved, expected)
-    # The zero is in the last layer alone; the layers below start at random.
-    assert not first.layers[-1][0].any()
-    assert not first.layers[-1][1].any()
-    assert all(weight.any() for weight, _ in first.layers[:-1])
-    assert reached["curve"][0]["steps"] == 0
-    assert steady([reached["law"]]) == steady([{name: reached["curve"][0][name] for name in reached["law"]}])
 
 
 def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
@@ -112,32 +82,14 @@ def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tm
     assert len(networks) == 5
 
 
-def test_the_folder_holds_the_policy_whose_figures_were_reported(trained):
-    folder, reached = trained
-    policy = load_policy(folder)
-    assert (policy.environment, policy.settings, policy.network.squashed) == (PROBE, RESIDUAL, False)
-    assert {name: policy.training[name] for name in SMALL.to_dict()} == SMALL.to_dict()
-    assert steady([policy.training["law"], policy.training["reached"]]) == steady([reached["law"], reached["policy"]])
-    env = gymnasium.make_vec(policy.environment, num_envs=SMALL.validation_lanes, randomize=True, duration=4.5)
-    assert steady([validate(env, policy.network.acting()).to_dict()]) == steady([reached["policy"]])
-    # On worlds that neither training nor validation has seen it is better as well.
-    unseen = gymnasium.make_vec(policy.environment, num_envs=32, randomize=True, duration=4.5)
-    assert validate(unseen, policy.network.acting(), 50_000).pooled < 0.9 * validate(unseen, zero, 50_000).pooled
-
-
-@pytest.fixture
-def events(trained):
-    """What TensorBoard shows of the small training: tag -> {step: value}."""
+def test_events_are_there_for_tensorboard_each_at_its_own_step(trained):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    (run,) = (trained[0] / "tensorboard").iterdir()
+    folder, reached = trained
+    (run,) = (folder / "tensorboard").iterdir()
     accumulator = EventAccumulator(str(run))
     accumulator.Reload()
-    return {tag: {event.step: event.value for event in accumulator.Scalars(tag)} for tag in accumulator.Tags()["scalars"]}
-
-
-def test_events_are_there_for_tensorboard_each_at_its_own_step(trained, events):
-    _, reached = trained
+    events = {tag: {one.step: one.value for one in accumulator.Scalars(tag)} for tag in accumulator.Tags()["scalars"]}
     assert {"rollout/ep_rew_mean", "train/value_loss", "validation/pooled_mm", "validation/tail_mm_law"} <= set(events)
     shown = list(events["validation/pooled_mm"].values())
     np.testing.assert_allclose(shown[:2], [point["pooled_mm"] for point in reached["curve"][:2]], rtol=1e-5)
@@ -177,33 +129,20 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     rig = Parameters().replace({"mechanics.mass": 4.0})
     residual = ResidualSettings("backstepping-weight", "variable_kp", 22.0, 0.05, 0.02)
     brief = replace(BRIEF, seed=30, lanes=4, steps=256, batch=64)
-    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant")
+    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant", margin=0.25)
     train(settings, residual, tmp_path, rig)
-    expected = {"sensors": "lab", "randomize": "plant", "parameters": rig, **residual.to_dict()}
+    expected = {"sensors": "lab", "randomize": "plant", **residual.to_dict()}
     expected["autoreset_mode"] = gymnasium.vector.AutoresetMode.SAME_STEP
-    for (name, arguments, _), lanes in zip(made, (4, 4), strict=True):
+    # Only training meets the margin.
+    for (name, arguments, _), own in zip(made, (widened(rig, 0.25), rig), strict=True):
         assert name == "BirthSIM/ForcepsResidual-v1"
-        assert arguments == {**expected, "num_envs": lanes}
+        assert arguments == {**expected, "parameters": own, "num_envs": 4}
     # Seed 30 starts from worlds of its own; all validations take the same ones, which training never meets.
     (_, _, trains), (_, _, checks) = made
     assert [seed for seed in trains if seed is not None] == [[2_300_000 + lane for lane in range(4)]]
     assert len(checks) >= 3
     assert set(checks) == {VALIDATION_SEED}
     assert load_policy(tmp_path).settings == residual
-
-
-def test_an_interrupt_is_passed_on_and_leaves_the_best_policy_so_far(tmp_path, monkeypatch, capsys, short_probe):
-    def interrupt(self):
-        if self.num_timesteps >= 2 * ROLLOUT + 100:
-            raise KeyboardInterrupt
-        return True
-
-    monkeypatch.setattr(monitor.Monitor, "_on_step", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        train(replace(BRIEF, steps=10**6, validations=10**6 // ROLLOUT), RESIDUAL, tmp_path)
-    assert f"interrupted after {2 * ROLLOUT + 112} steps" in capsys.readouterr().out
-    assert load_policy(tmp_path).training["steps"] == 10**6
-    assert (tmp_path / "checkpoint.safetensors").is_file()
 
 
 def test_a_training_that_could_not_tell_policies_apart_does_not_begin(tmp_path, monkeypatch, short_probe):
@@ -247,3 +186,41 @@ def test_a_training_ends_once_it_is_far_enough_below_the_papers_law(tmp_path, sh
         assert (reached["curve"][-1]["steps"] < settings.steps) == enough
     again = train(easy, residual, tmp_path / "True", Parameters().replace({"mechanics.mass": 3.0}))
     assert again["curve"][-1]["steps"] < easy.steps, "once more, it is still good enough"
+
+
+@pytest.mark.parametrize("writes", [0, 1, 5, 30])
+def test_a_full_disk_is_said_once_with_the_place_and_without_a_traceback(tmp_path, monkeypatch, capsys, short_probe, writes):
+    """TensorBoard writes in a thread of its own."""
+    from tensorboard.summary.writer.record_writer import RecordWriter
+
+    done, write = [], RecordWriter.write
+
+    def full(self, data):
+        done.append(data)
+        if len(done) > writes:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(self, data)
+
+    hook = threading.excepthook
+    with monkeypatch.context() as patch:
+        patch.setattr(RecordWriter, "write", full)
+        with pytest.raises(OSError, match="No space left on device") as caught:
+            train(BRIEF, RESIDUAL, tmp_path)
+    assert caught.value.filename == str(tmp_path / "tensorboard")
+    assert "Traceback" not in capsys.readouterr().err
+    assert threading.excepthook is hook
+    # With room again, the same command goes on.
+    assert train(BRIEF, RESIDUAL, tmp_path)["curve"][-1]["steps"] == BRIEF.steps
+
+
+def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
+    settings = TrainingSettings(
+        "BirthSIM/ProbeResidual-v2", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
+    )  # fmt: skip
+    train(settings, ResidualSettings(), tmp_path)
+    policy = load_policy(tmp_path)
+    assert policy.training["privileged"] is True
+    with pytest.raises(
+        ValueError, match=rf"maps {policy.network.inputs} to 2 numbers; allowed: {policy.network.inputs - FIGURES}"
+    ):
+        ResidualController(policy=tmp_path)

@@ -17,8 +17,8 @@ from birthsim_env.physics.gradients import symbols, tracing
 from birthsim_env.physics.gradients.graph import Graph
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics.gradients.right_hand_side import INPUTS
-from birthsim_env.physics.gradients.runge_kutta import STAGES
 from birthsim_env.physics.gradients.steps import adjoint, back_over, lay_out
+from birthsim_env.physics.runge_kutta import STAGES
 
 ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]
 """Of the space, in the order of gradients: state, openings, force."""
@@ -37,22 +37,16 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     x, dx, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES), scratch(STATES)
     u, f, by, total = scratch(4), scratch(2), scratch(INPUTS), scratch(INPUTS)
     dynamics.load(block(rig, PARAMETERS), 0, n, p)
-    for row in range(INPUTS):
-        for i in range(n):
-            total[row, i], by[row, i] = 0.0 if row < STATES else weighs[row, i], 0.0
-    for row in range(STATES):
-        for i in range(n):
-            points[BEGINNING, row, i], late[row, i] = given[row, i], weighs[row, i]
-    for row in range(4):
-        for i in range(n):
-            u[row, i] = given[STATES + row, i]
-    for row in range(2):
-        for i in range(n):
-            f[row, i] = given[PUSHED + row, i]
+    total[:STATES], by[:] = 0.0, 0.0
+    dynamics.copy(weighs, late, n)
+    dynamics.copy(weighs[STATES:], total[STATES:], n)
+    dynamics.copy(given, points[BEGINNING], n)
+    dynamics.copy(given[STATES:], u, n)
+    dynamics.copy(given[PUSHED:], f, n)
     lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
     back_over(adjoint, points, u, f, p, steps, step, late, x, g, by, total, n)
     dynamics.settle(late, n)
-    dynamics.copy(late, total, n)
+    dynamics.copy(late, total[:STATES], n)
     dynamics.store(total, 0, n, result)
     return 0
 

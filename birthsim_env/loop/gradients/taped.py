@@ -16,6 +16,7 @@ from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.dynamics import load, store
 
 Whole = NDArray[np.int64]
 
@@ -76,12 +77,8 @@ def _backward(
     given, result = np.zeros((takes, BLOCK)), np.zeros((gives, BLOCK))
     for start in range(first, last, BLOCK):
         n, place = min(BLOCK, last - start), tape.shape[1]
-        for row in range(bars.shape[0]):
-            for i in range(n):
-                space[row, i] = bars[row, start + i]
-        for row in range(at.PARAMETERS):
-            for i in range(n):
-                p[row, i] = rig[row, start + i]
+        load(bars, start, n, space)
+        load(rig, start, n, p)
         for period in range(periods - 1, -1, -1):
             for e in range(entries.shape[0] - 1, -1, -1):
                 if entries[e, CLOSES] == 0 or period == periods - 1:
@@ -96,9 +93,7 @@ def _backward(
                     for k in range(entries[e, COUNT]):
                         for i in range(n):
                             space[touched[where + k], i] = result[k, i]
-        for row in range(bars.shape[0]):
-            for i in range(n):
-                bars[row, start + i] = space[row, i]
+        store(space, start, n, bars)
 
 
 class TapedLoop(Loop):

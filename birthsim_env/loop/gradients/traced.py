@@ -21,6 +21,7 @@ from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
 from birthsim_env.physics.gradients.tracing import UntraceableError
 
 HEAD = f"""{source.HEAD}from birthsim_env.loop.stage import block, scratch
+from birthsim_env.physics.dynamics import copy
 
 """
 
@@ -28,19 +29,11 @@ KERNEL = """
 
 @kernel
 def adjoint(tape, bars, out, rig, constants, lane, n):
-    given, weighs = block(tape, {reads}), block(bars, {rows})
     a, b, o = scratch({reads}), scratch({rows}), scratch({rows})
-    for row in range({reads}):
-        for i in range(n):
-            a[row, i] = given[row, i]
-    for row in range({rows}):
-        for i in range(n):
-            b[row, i] = weighs[row, i]
+    copy(block(tape, {reads}), a, n)
+    copy(block(bars, {rows}), b, n)
     back(a, b, o, n)
-    result = block(out, {rows})
-    for row in range({rows}):
-        for i in range(n):
-            result[row, i] = o[row, i]
+    copy(o, block(out, {rows}), n)
     return 0
 """
 

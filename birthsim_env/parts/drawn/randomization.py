@@ -125,6 +125,11 @@ def draw_parameters(nominal: Parameters, ranges: Ranges, rng: np.random.Generato
 
 def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lanes: int) -> Array:
     """``parameter_column`` of what ``draw_parameters`` gives each lane, (PARAMETERS, num_lanes); ``ranges`` are checked."""
+    return parameter_columns(draw_rig(nominal, ranges, streams), num_lanes)
+
+
+def draw_rig(nominal: Parameters, ranges: Ranges, streams: Streams) -> Parameters:
+    """What ``draw_parameters`` gives each of L lanes, in one rig whose drawn fields are (L,)."""
     drawn = _drawn(ranges, streams)
     rig = copy.copy(nominal)
     for name, values in drawn.items():
@@ -137,7 +142,7 @@ def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lane
         bore, before = (np.maximum(one.cylinder1.area_p, one.cylinder2.area_p) for one in (rig, nominal))
         object.__setattr__(rig, "chambers", copy.copy(rig.chambers))
         object.__setattr__(rig.chambers, "dead_volume", bore / before * nominal.chambers.dead_volume)
-    return parameter_columns(rig, num_lanes)
+    return rig
 
 
 def _drawn(ranges: Ranges, rng: Any) -> dict[str, Any]:

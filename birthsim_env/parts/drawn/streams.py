@@ -72,7 +72,8 @@ def _advance(state: States, i: int) -> None:
 
 
 @helper
-def _next64(state: States, i: int) -> np.uint64:
+def next64(state: States, i: int) -> np.uint64:
+    """64 random bits of lane ``i``."""
     _advance(state, i)
     word, turn = state[HIGH, i] ^ state[LOW, i], state[HIGH, i] >> np.uint64(58)
     return np.uint64((word >> turn) | (word << ((np.uint64(64) - turn) & np.uint64(63))))
@@ -85,16 +86,16 @@ def _next32(state: States, i: int) -> np.uint64:
         waiting = np.uint64(state[SPARE, i] & _HALF)
         state[SPARE, i] = np.uint64(0)
         return waiting
-    word = _next64(state, i)
+    word = next64(state, i)
     state[SPARE, i] = _WAITS | (word >> np.uint64(32))
     return word & _HALF
 
 
-@kernel
-def _seed(words: Words, state: States) -> None:
-    """Fills ``state`` (5, N) from the entropy ``words`` (W, N), W >= 4, as ``SeedSequence`` and ``PCG64`` do."""
-    lanes = words.shape[1]
-    pool, drawn = np.empty((POOL, lanes), dtype=np.uint32), np.empty((2 * POOL, lanes), dtype=np.uint32)
+@helper
+def seed(words: Words, pool: Words, drawn: Words, state: States, lanes: int) -> None:
+    """Fills ``state`` (5, N) from the entropy ``words`` (W, N), W >= 4, as ``SeedSequence`` and ``PCG64`` do.
+
+    ``pool`` (POOL, N) and ``drawn`` (2 POOL, N) are scratch."""
     used = 0
     for k in range(POOL):
         for i in range(lanes):
@@ -123,35 +124,53 @@ def _seed(words: Words, state: States) -> None:
         _advance(state, i)
 
 
+@kernel
+def _seed(words: Words, state: States) -> None:
+    lanes = words.shape[1]
+    pool, drawn = np.empty((POOL, lanes), dtype=np.uint32), np.empty((2 * POOL, lanes), dtype=np.uint32)
+    seed(words, pool, drawn, state, lanes)
+
+
 @helper
 def _joined(words: Words, k: int, i: int) -> np.uint64:
     """Two words as one of 64 bits, the lower first."""
     return np.uint64(words[k, i]) | (np.uint64(words[k + 1, i]) << np.uint64(32))
 
 
+@helper
+def fraction(state: States, i: int) -> float:
+    """A number in [0, 1) of lane ``i``, with 53 random bits."""
+    return (next64(state, i) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@helper
+def bounded(state: States, i: int, count: np.uint64) -> np.int64:
+    """A whole number of lane ``i`` from 0, ``count`` < 2^32 of them alike, without bias (Lemire 2019)."""
+    unfair = (np.uint64(1 << 32) - count) % count
+    product = _next32(state, i) * count
+    while (product & _HALF) < unfair:
+        product = _next32(state, i) * count
+    return np.int64(product >> np.uint64(32))
+
+
 @kernel
 def _uniform(state: States, low: float, span: float, drawn: Array) -> None:
-    """``drawn`` (M, N): M numbers of every lane, with 53 random bits each."""
+    """``drawn`` (M, N): M numbers of every lane."""
     for k in range(drawn.shape[0]):
         for i in range(drawn.shape[1]):
-            drawn[k, i] = low + span * ((_next64(state, i) >> np.uint64(11)) * (1.0 / 9007199254740992.0))
+            drawn[k, i] = low + span * fraction(state, i)
 
 
 @kernel
 def _words64(state: States, drawn: States) -> None:
     for i in range(drawn.shape[0]):
-        drawn[i] = _next64(state, i)
+        drawn[i] = next64(state, i)
 
 
 @kernel
 def _bounded(state: States, count: np.uint64, low: int, drawn: NDArray[np.int64]) -> None:
-    """Whole numbers from ``low``, ``count`` < 2^32 of them alike, without bias (Lemire 2019)."""
-    unfair = (np.uint64(1 << 32) - count) % count
     for i in range(drawn.shape[0]):
-        product = _next32(state, i) * count
-        while (product & _HALF) < unfair:
-            product = _next32(state, i) * count
-        drawn[i] = low + np.int64(product >> np.uint64(32))
+        drawn[i] = low + bounded(state, i, count)
 
 
 class Streams:

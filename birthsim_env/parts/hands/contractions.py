@@ -3,17 +3,68 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from birthsim_env.parts.drawn.seeding import Range, draw, vectorised
-from birthsim_env.parts.hands.user_forces import MOST, STRONGEST, ForceProfile
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.stage import Stage, table1, table2, table3
+from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
+from birthsim_env.parts.hands.user_forces import MOST, STRONGEST, UserForce, knot_before
 from birthsim_env.parts.references import TURNED
 from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row
 from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
 
 
-class Contractions(ForceProfile):
+class Contraction(Rows):
+    """What an episode draws for each of its contractions."""
+
+    amplitude = row("N", "of the contraction")
+    push = row("1", "of its pushes, in amplitudes")
+    wave = row("1", "row of the pushes among the waves")
+
+
+class Heading(Numbers):
+    """Where the force points."""
+
+    x = number("1", "cosine")
+    y = number("1", "sine")
+
+
+@helper
+def _size(own: Array, waves: Array, knot: int, i: int) -> float:
+    """Force at a knot, N: less of the contraction, so that the sum with its pushes peaks near its amplitude."""
+    k, place = knot // waves.shape[1], knot % waves.shape[1]
+    if k == own.shape[0]:
+        return 0.0
+    one = Contraction(own[k])
+    swell, wave, part = waves[0, place], waves[int(one.wave[i]), place], one.push[i]
+    size: float = one.amplitude[i] * ((1.0 - part) * swell * swell + part * wave * wave)
+    return size
+
+
+@helper
+def _contract(time: Array, own: Array, waves: Array, times: Array, heading: Heading, force: Array, n: int) -> None:
+    """``own`` (K, 3, N), each a ``Contraction``; ``waves`` (W, M) of the contraction and of its pushes, 0 to 1, at the M knots
+    of each; ``times`` (K M + 1,) of all knots, between which the force is linear."""
+    for i in range(n):
+        low = knot_before(times[:, None], 0, times.shape[0], time[i])
+        span = times[low + 1] - times[low]
+        part = max(0.0, min(1.0, (time[i] - times[low]) / span)) if span > 0.0 else 1.0
+        before, after = _size(own, waves, low, i), _size(own, waves, low + 1, i)
+        x, y = before * heading.x, before * heading.y
+        force[0, i] = x + part * (after * heading.x - x)
+        force[1, i] = y + part * (after * heading.y - y)
+
+
+@kernel
+def _contractions_stage(world: World, seen: Seen, memory: int, heading: Heading, tables: int, lane: int, n: int) -> int:
+    own = table3(tables, 0)[:, :, lane : lane + n]
+    _contract(seen.time, own, table2(tables, 1), table1(tables, 2), heading, world.force, n)
+    return 0
+
+
+class Contractions(UserForce):
     """Uterine contractions: sin^2 of ``lasts`` s and ``amplitude`` N, with maternal pushes on top, along ``heading``.
 
     Each contraction carries ``pushes`` sin^2 bumps of ``push`` times its amplitude over its middle half (assumed).
@@ -31,7 +82,6 @@ class Contractions(ForceProfile):
         push: Range = 0.25,
         heading: float = 0.0,
     ) -> None:
-        super().__init__()
         self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
         self.heading = heading
         checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
@@ -43,43 +93,29 @@ class Contractions(ForceProfile):
         checked_range("push", push, "1", least=0.0, most=1.0)
         checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
 
-    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-        table = self._table(1)
-        self._contract(table, np.zeros(1, dtype=np.int64), rng)
-        return [tuple(knot) for knot in table[:, :, 0].tolist()]
-
     def prepare(self, num_envs: int) -> None:
-        self._knots = self._table(num_envs)
-        self._counts = np.full(num_envs, float(len(self._knots)))
+        time, (least, most) = np.arange(0.0, self.lasts, self.GRID), self.pushes
+        middle = np.clip((time - 0.25 * self.lasts) / (0.5 * self.lasts), 0.0, 1.0)
+        turns = [math.pi * time / self.lasts, *(math.pi * bumps * middle for bumps in range(least, most + 1))]
+        self._waves: Array = np.array([exact.direction(one)[1] for one in turns])
+        begins = self.lasts * np.arange(self.count)
+        self._times: Array = np.concatenate([*(one + time for one in begins), [self.count * self.lasts]])
+        self._heading = Heading.numbers(**dict(zip("xy", exact.direction(self.heading), strict=True)))
+        self._own: Array = np.zeros((self.count, Contraction.size, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        if type(self).knots is Contractions.knots:
-            self._contract(self._knots, np.atleast_1d(lane), rng)
-        else:
-            super().begin(lane, rng)
+        least, most = self.pushes
+        for own in self._own:
+            amplitude, push = draw(self.amplitude, rng), draw(self.push, rng)
+            put(own, lane, (amplitude, push, rng.integers(least, most + 1) + (1 - least)))
 
-    @property
-    def _time(self) -> Array:
-        """Since a contraction began, s, (M,)."""
-        return np.arange(0.0, self.lasts, self.GRID)
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces, heading = np.empty((time.shape[0], 2, time.shape[1])), Heading(self._heading)
+        for now, force in zip(time, forces, strict=True):
+            _contract(now, self._own, self._waves, self._times, heading, force, len(now))
+        return forces
 
-    def _table(self, lanes: int) -> Array:
-        """Knots (M, 3, N) without forces; their times are the same in all lanes and episodes."""
-        times = [begins + self._time for begins in self.lasts * np.arange(self.count)]
-        table = np.zeros((self.count * len(self._time) + 1, 3, lanes))
-        table[:, 0] = np.concatenate([*times, [self.count * self.lasts]])[:, None]
-        return table
-
-    def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
-        """Draw the forces of the lanes (L,) of a table of knots."""
-        time, (x, y), (least, most) = self._time, exact.direction(self.heading), self.pushes
-        _, swell = exact.direction(math.pi * time / self.lasts)
-        middle = np.clip((time - 0.25 * self.lasts) / (0.5 * self.lasts), 0.0, 1.0)
-        waves = np.array([exact.direction(math.pi * bumps * middle)[1] for bumps in range(least, most + 1)])
-        for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
-            size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
-            push = waves[np.broadcast_to(rng.integers(least, most + 1), lanes.shape) - least].T
-            # Less of the contraction, so that the sum with its pushes peaks near its size.
-            force = size * ((1.0 - fraction) * swell[:, None] * swell[:, None] + fraction * push * push)
-            contraction[:, 1, lanes], contraction[:, 2, lanes] = force * x, force * y
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        return Stage(_contractions_stage, self._heading, tables=(self._own, self._waves, self._times))

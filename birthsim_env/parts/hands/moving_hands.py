@@ -12,7 +12,7 @@ from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, table2, table3, table4
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
-from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, UserForce
+from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, CompiledForce, UserForce
 from birthsim_env.parts.references import LONGEST, TURNED, minimum_jerk
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -35,9 +35,10 @@ class Wave(Rows):
     phase = row("rad", "at the beginning")
 
 
-@helper
-def _waves(time: Array, own: Array, force: Array, n: int) -> None:
-    """``own`` (2, W, 3, N): of each axis the waves, each a ``Wave``."""
+@kernel
+def _waves(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Table (2, W, 3, N): of each axis the waves, each a ``Wave``."""
+    time, own, force = seen.time, table4(tables, 0)[:, :, :, lane : lane + n], world.force
     for i in range(n):
         fraction = minimum_jerk(time[i] / FADE, 0)
         for axis in range(2):
@@ -46,15 +47,10 @@ def _waves(time: Array, own: Array, force: Array, n: int) -> None:
                 wave = Wave(own[axis, w])
                 total += wave.amplitude[i] * exact.sine(wave.rate[i] * time[i] + wave.phase[i])
             force[axis, i] = fraction * total
-
-
-@kernel
-def _waves_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    _waves(seen.time, table4(tables, 0)[:, :, :, lane : lane + n], world.force, n)
     return 0
 
 
-class _Waves(UserForce):
+class _Waves(CompiledForce):
     """Sums of sines."""
 
     jump_rate = math.inf
@@ -63,15 +59,8 @@ class _Waves(UserForce):
     def prepare(self, num_envs: int) -> None:
         self._own: Array = np.zeros((2, self.waves, Wave.size, num_envs))
 
-    def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        forces = np.empty((time.shape[0], 2, time.shape[1]))
-        for now, force in zip(time, forces, strict=True):
-            _waves(now, self._own, force, len(now))
-        return forces
-
     def stage(self) -> Stage:
-        """``force``, compiled into the closed loop."""
-        return Stage(_waves_stage, tables=(self._own,))
+        return Stage(_waves, tables=(self._own,))
 
 
 class Sine(_Waves):
@@ -153,9 +142,11 @@ class Grip(Numbers):
     damping = number("N s/m", "between hand and end effector")
 
 
-@helper
-def _guide(time: Array, motion: Point, arm: Arm, points: Array, hand: Hand, grip: Grip, force: Array, n: int) -> None:
-    """``motion`` of the end effector; ``points`` (POINTS, 2, N), m from where the hand began."""
+@kernel
+def _guide(world: World, seen: Seen, hand: Hand, grip: Grip, tables: int, lane: int, n: int) -> int:
+    """Tables: ``Arm``, and points (POINTS, 2, N), m from where the hand began."""
+    arm, points = Arm(table2(tables, 0)[:, lane : lane + n]), table3(tables, 1)[:, :, lane : lane + n]
+    time, motion = seen.time, world.motion
     for i in range(n):
         mass, spring, damper, lasts = arm.mass[i], arm.stiffness[i], arm.damping[i], arm.lasts[i]
         if not (hand.time[i] <= time[i]):
@@ -182,7 +173,8 @@ def _guide(time: Array, motion: Point, arm: Arm, points: Array, hand: Hand, grip
                 hand.position[axis, i] += h * hand.velocity[axis, i]
         hand.time[i] = time[i]
         for axis in range(2):
-            force[axis, i] = _held(motion, hand, grip, axis, i)
+            world.force[axis, i] = _held(motion, hand, grip, axis, i)
+    return 0
 
 
 @helper
@@ -193,14 +185,7 @@ def _held(motion: Point, hand: Hand, grip: Grip, axis: int, i: int) -> float:
     return pull
 
 
-@kernel
-def _guide_stage(world: World, seen: Seen, hand: Hand, grip: Grip, tables: int, lane: int, n: int) -> int:
-    arm, points = Arm(table2(tables, 0)[:, lane : lane + n]), table3(tables, 1)[:, :, lane : lane + n]
-    _guide(seen.time, world.motion, arm, points, hand, grip, world.force, n)
-    return 0
-
-
-class Guided(UserForce):
+class Guided(CompiledForce):
     """A hand that holds the end effector and leads it from place to place.
 
     The arm is a mass (kg) on a spring (N/m) and damper to where it wants to be; the grip between hand and end effector is
@@ -242,15 +227,8 @@ class Guided(UserForce):
             put(point, lane, (size * x, size * y))
         Hand(self._state).time[lane] = np.inf  # it takes hold of the end effector wherever that is
 
-    def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        forces = np.empty((1, 2, time.shape[1]))
-        motion, grip = Point(np.concatenate([position, velocity])), Grip(np.array(self.GRIP))
-        _guide(time[0], motion, Arm(self._own), self._points, Hand(self._state), grip, forces[0], time.shape[1])
-        return forces
-
     def stage(self) -> Stage:
-        """``force``, compiled into the closed loop."""
-        return Stage(_guide_stage, np.array(self.GRIP), self._state, (self._own, self._points))
+        return Stage(_guide, np.array(self.GRIP), self._state, (self._own, self._points))
 
 
 _ANYWHERE = (0.0, 2 * math.pi)

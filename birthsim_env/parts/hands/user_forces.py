@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import FORCE, MOTION, TIME, Seen, World
 from birthsim_env.loop.stage import Stage, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
@@ -58,6 +59,21 @@ class UserForce:
         raise NotImplementedError(f"{type(self).__name__}.force(time, position, velocity) is missing; it returns N, (K, 2, N)")
 
 
+class CompiledForce(UserForce):
+    """A force that a ``stage`` of the closed loop computes."""
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces, stage = np.zeros((time.shape[0], 2, time.shape[1])), self.stage()
+        motion = [(np.concatenate([position, velocity]), MOTION)] if self.closed_loop else []
+        for now, force in zip(np.array(time, dtype=np.float64), forces, strict=True):
+            Loop(len(now), [(force, FORCE), *motion], [(now[None], TIME)], [stage]).run()
+        return forces
+
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        raise NotImplementedError
+
+
 def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) -> Array:
     """What a hand pushes with, N, (K, 2, N), at ``time`` (K, N), s; ``position`` and ``velocity`` (2, N) in m and m/s.
 
@@ -78,41 +94,51 @@ class Knot(Rows):
 
 
 @helper
-def _interpolate(time: Array, knots: Array, counts: Array, force: Array, n: int) -> None:
-    """``knots`` (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
+def knot_before(times: Array, i: int, count: int, now: float) -> int:
+    """The last of the ``count`` knots of lane ``i`` at or before ``now``, s, but not the very last; ``times`` (M, N), s."""
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle, i] <= now:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _interpolate(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Knots (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
+    knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
+    time, force = seen.time, world.force
     for i in range(n):
-        low, high = 0, int(counts[i]) - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if Knot(knots[middle]).time[i] <= time[i]:
-                low = middle
-            else:
-                high = middle
-        before, after = Knot(knots[low]), Knot(knots[high])
+        count = int(counts[i])
+        low = knot_before(knots[:, 0], i, count, time[i])
+        before, after = Knot(knots[low]), Knot(knots[min(low + 1, count - 1)])
         span = after.time[i] - before.time[i]
         part = max(0.0, min(1.0, (time[i] - before.time[i]) / span)) if span > 0.0 else 1.0
         for axis in range(2):
             force[axis, i] = before.force[axis, i] + part * (after.force[axis, i] - before.force[axis, i])
-
-
-@kernel
-def _knots_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
-    _interpolate(seen.time, knots, counts, world.force, n)
     return 0
 
 
-def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
+_NUMBERS = np.empty(0)
+
+
+def _checked_knots(name: str, knots: Any, lanes: int = 1, like: Array = _NUMBERS) -> Array:
     """Knots as an array (M, 3, L), or a ``ValueError`` that names them, of the first lane that is wrong.
 
-    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,).
+    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,), or symbols as those of an array that is ``like``
+    them, which nobody can check.
     """
     try:
-        columns = np.empty((len(knots), 3, lanes))
+        columns = np.empty_like(like, shape=(len(knots), 3, lanes))
         for rows, knot in zip(columns, knots, strict=True):
             put(rows, slice(None), knot)
     except (TypeError, ValueError, OverflowError):
         columns = np.empty((0, 3, lanes))
+    if columns.dtype == object:
+        return columns
     late = columns[1:, 0] < columns[:-1, 0]
     if len(columns) == 0 or late.any() or not np.isfinite(columns).all():
         if lanes > 1:
@@ -122,7 +148,7 @@ def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
     return columns
 
 
-class ForceProfile(UserForce):
+class ForceProfile(CompiledForce):
     """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
@@ -144,7 +170,7 @@ class ForceProfile(UserForce):
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         for one, own in served(self.knots, lane, rng):
             lanes = np.atleast_1d(one)
-            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes))
+            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes), self._knots)
             missing = len(columns) - len(self._knots)
             if missing > 0:
                 self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
@@ -152,15 +178,8 @@ class ForceProfile(UserForce):
                 put(knot, lanes, values)
             self._counts[one] = len(columns)
 
-    def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        forces = np.empty((time.shape[0], 2, time.shape[1]))
-        for now, force in zip(time, forces, strict=True):
-            _interpolate(now, self._knots, self._counts, force, len(now))
-        return forces
-
     def stage(self) -> Stage:
-        """``force``, compiled into the closed loop."""
-        return Stage(_knots_stage, tables=(self._knots, self._counts))
+        return Stage(_interpolate, tables=(self._knots, self._counts))
 
 
 class AlternatingSteps(ForceProfile):

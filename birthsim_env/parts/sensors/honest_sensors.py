@@ -1,32 +1,31 @@
 """Sensors with the errors that data sheets and laboratories know: the sensor model ``honest``.
 
-Figures, their basis and the ranges that are drawn from are fields of ``physics.electronics``. With every error switched off it
-is the sensor model ``lab`` to the last bit.
+Figures, their basis and the ranges that are drawn from are fields of ``physics.electronics``.
 """
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.rows import Seen, Signals, World, measurement_of
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import FORCE, MOTION, OPENING, STATE, TICK, Seen, Signals, World, measurement_of
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
-from birthsim_env.parts.sensors.looking import looked_at
-from birthsim_env.parts.sensors.noise import happens, normal, uniform
+from birthsim_env.parts.sensors.noise import happens, noise_of, uniform
 from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Figures, Shared, Unit, field, shared, shift, work_out
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel, over
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.electronics import Electronics
 
 TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
-"""Channels of random numbers; the pressures have the first four, all as the sensor model ``lab``."""
+"""Channels of random numbers; the pressures have the first four."""
 
 
 class Readings(Rows):
@@ -40,22 +39,6 @@ class Readings(Rows):
     acceleration = rows("x y", "m/s2", "of the end effector")
 
 
-class Kept(NamedTuple):
-    """What the sensors remember of N lanes."""
-
-    keys: NDArray[np.uint64]
-    errors: Errors
-    queue: Array
-    """Samples on their way (Q, 3, N)."""
-    arrived: tracker.Arrived
-    passed: Array
-    """Forces behind the low-pass, N, (2, N)."""
-    late: Array
-    """The last forces converted, N, (Q, 2, N)."""
-    readings: Readings
-    accelerometer: acceleration.Accelerometer
-
-
 @helper
 def _converted(value: float, step: float, least: float, most: float) -> float:
     """``value`` as a converter with a ``step`` tells it; a step of 0 is no converter."""
@@ -67,7 +50,7 @@ def _sample(e: Errors, shared: Shared, i: int, axis: int, x: float, y: float, no
     """What the tracker measures along one axis where it is at (``x``, ``y``), with a ``noise`` in m."""
     true = x if axis == 0 else y
     scaled = true + e.scaled[i] * (true - shared.registration[axis])
-    measured: float = scaled + (field(e, i, axis, x, y) - e.registered[axis, i]) + noise
+    measured: float = scaled + (field(e, i, axis, x, y) - e.registered[axis, i] if e.height[i] > 0.0 else 0.0) + noise
     return measured
 
 
@@ -81,32 +64,41 @@ def _growth(e: Errors, shared: Shared, i: int, x: float, y: float) -> float:
 
 
 @helper
-def _track(world: World, seen: Signals, shared: Shared, kept: Kept, i: int, tick: int) -> None:
-    """Take a sample where it is due, and let arrive what is under way."""
-    e, key, time, latency = kept.errors, kept.keys[i], seen.time[i], kept.errors.figures.position_latency[i]
+def _track(
+    world: World, time: float, shared: Shared, e: Errors, queue: Array, arrived: tracker.Arrived, key: np.uint64, i: int
+) -> None:
+    """Take a sample where it is due, and let arrive what is under way in the ``queue`` (Q, 3, N)."""
+    tick = int(world.tick[i])
     due = tracker.sample_due(tick, time, shared.period, shared.rate)
     if due and (tick == 0 or not happens(key, tick, LOST, e.figures.position_dropout[i])):
         x, y = world.motion.position[0, i], world.motion.position[1, i]
         noise = e.figures.position_noise[i] * _growth(e, shared, i, x, y)
-        at_x = _sample(e, shared, i, 0, x, y, noise * normal(key, tick, TRACKED))
-        at_y = _sample(e, shared, i, 1, x, y, noise * normal(key, tick, TRACKED + 1))
-        tracker.take(kept.queue, i, time, shared.rate, at_x, at_y)
+        at_x = _sample(e, shared, i, 0, x, y, noise_of(key, tick, TRACKED, noise))
+        at_y = _sample(e, shared, i, 1, x, y, noise_of(key, tick, TRACKED + 1, noise))
+        tracker.take(queue, i, time, shared.rate, at_x, at_y)
         if tick == 0:
             speed = world.motion.velocity
-            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, speed[0, i], speed[1, i])
-    tracker.arrive(kept.queue, kept.arrived, i, time, latency)
+            tracker.start(queue, arrived, i, at_x, at_y, speed[0, i], speed[1, i])
+    tracker.arrive(queue, arrived, i, time, e.figures.position_latency[i])
 
 
-@helper
-def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> None:
+@kernel
+def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, lane: int, n: int) -> int:
     """One control instant."""
-    e, readings, late, passed, slots = kept.errors, kept.readings, kept.late, kept.passed, kept.late.shape[0]
+    mine = slice(lane, lane + n)
+    keys, e, queue = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine]
+    arrived, own = tracker.Arrived(table2(tables, 3)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine])
+    passed, late, readings = table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine], Readings(table2(tables, 6)[:, mine])
+    slots = late.shape[0]
     for i in range(n):
-        tick, key = int(world.tick[i]), kept.keys[i]
-        _track(world, seen, shared, kept, i, tick)
+        tick, key = int(world.tick[i]), keys[i]
+        _track(world, seen.time[i], shared, e, queue, arrived, key, i)
         whole = math.floor(e.delay[i] + 1e-9)
         rest = max(0.0, e.delay[i] - whole)
-        again = acceleration.looked(kept.accelerometer, i, tick)
+        newest, earlier = tick - int(whole), tick - int(whole) - 1
+        # Where other lanes begin anew, all are looked at once more in the same period.
+        again = tick > 0 and own.tick[i] == tick
+        own.tick[i] = tick
         read = tick == 0 or not happens(key, tick, MISSED, e.figures.missed_periods[i])
         for axis in range(2):
             force = world.force[axis, i]
@@ -114,28 +106,31 @@ def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> 
             share = 1.0 if tick == 0 else e.passed[i]
             if not again:
                 passed[axis, i] = passed[axis, i] + share * (sensed - passed[axis, i]) if share < 1.0 else sensed
-            value = passed[axis, i] + e.figures.force_noise[i] * normal(key, tick, NOISE_OF_FORCE + axis)
+            value = passed[axis, i] + noise_of(key, tick, NOISE_OF_FORCE + axis, e.figures.force_noise[i])
             value = _converted(value, e.force_step[i], -shared.force_range, shared.force_range)
             for k in range(slots if tick == 0 else 1):
                 late[(tick + k) % slots, axis, i] = value
             if read:
-                newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
-                readings.force[axis, i] = newer + rest * (older - newer)
+                newer = late[newest % slots, axis, i]
+                readings.force[axis, i] = newer + rest * (late[earlier % slots, axis, i] - newer)
             if shared.share > 0.0:
-                gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
-                velocity, memory = world.motion.velocity[axis, i], kept.accelerometer
-                value = acceleration.feel(memory, i, axis, tick, velocity, gain, bias, shared.period, shared.share, again)
+                velocity, last = world.motion.velocity[axis, i], own.low_passed[axis, i]
+                if not again:
+                    # Where an episode begins nothing is known of the motion before it: the acceleration is taken for zero.
+                    change = velocity - (velocity if tick == 0 else own.velocity[axis, i])
+                    felt = (1.0 + e.acceleration_gain[axis, i]) * (change / shared.period) + e.acceleration_bias[axis, i]
+                    own.velocity[axis, i] = velocity
+                    own.low_passed[axis, i] = felt if tick == 0 else last + shared.share * (felt - last)
                 if read:
-                    noise = shared.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
-                    readings.acceleration[axis, i] = value + noise
+                    noise = noise_of(key, tick, acceleration.NOISE + axis, shared.acceleration_noise)
+                    readings.acceleration[axis, i] = own.low_passed[axis, i] + noise
         if read:
-            arrived = kept.arrived
             stamp = arrived.time[i] + (e.figures.position_latency[i] - shared.stamped)
             readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
             for axis in range(2):
                 readings.position[axis, i], readings.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
             for chamber in range(4):
-                noise = e.figures.pressure_noise[i] * normal(key, tick, chamber)
+                noise = noise_of(key, tick, chamber, e.figures.pressure_noise[i])
                 value = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
                 readings.pressure[chamber, i] = _converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
         seen.position_time[i] = readings.position_time[i]
@@ -144,59 +139,42 @@ def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> 
             seen.user_force[axis, i], seen.acceleration[axis, i] = readings.force[axis, i], readings.acceleration[axis, i]
         for chamber in range(4):
             seen.pressure[chamber, i] = readings.pressure[chamber, i]
-
-
-@kernel
-def _honest_stage(world: World, seen: Seen, memory: int, shared: Shared, tables: int, lane: int, n: int) -> int:
-    mine = slice(lane, lane + n)
-    kept = Kept(
-        table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine],
-        tracker.Arrived(table2(tables, 3)[:, mine]), table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine],
-        Readings(table2(tables, 6)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine]),
-    )  # fmt: skip
-    _honest(world, seen, shared, kept, n)
     return 0
 
 
-@helper
-def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Errors, last: Array, openings: Array) -> None:
-    """Make ``openings`` (4, N) what the board puts out, which is ``last`` (4, N) in a missed period.
+@kernel
+def _put_out(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Make the openings what the board puts out, which is ``last`` (4, N) in a missed period.
 
     A clock that jitters is late by a fraction of the period, drawn uniformly. What is put out is then the mean of both openings
     over the period: the spool, with a lag of ``tau``, misses what it would do by at most (T/tau)^2/8 of the change.
     """
-    for i in range(ticks.shape[0]):
-        tick, jitter = int(ticks[i]), e.figures.clock_jitter[i]
+    mine = slice(lane, lane + n)
+    keys, e, last = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table2(tables, 2)[:, mine]
+    for i in range(n):
+        tick, jitter = int(world.tick[i]), e.figures.clock_jitter[i]
         missed = tick > 0 and happens(keys[i], tick, MISSED, e.figures.missed_periods[i])
         late = jitter * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if tick > 0 and jitter > 0.0 else 0.0
         for valve in range(4):
-            value = _converted(openings[valve, i], e.opening_step[i], -1.0, 1.0)
+            value = _converted(seen.opening[valve, i], e.opening_step[i], -1.0, 1.0)
             value = last[valve, i] if missed else value
-            openings[valve, i] = value + late * (last[valve, i] - value)
+            seen.opening[valve, i] = value + late * (last[valve, i] - value)
             last[valve, i] = value
-
-
-@kernel
-def _board_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    mine = slice(lane, lane + n)
-    keys, e, last = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table2(tables, 2)[:, mine]
-    _put_out(world.tick[:n], keys, e, last, seen.opening[:, :n])
     return 0
 
 
-class HonestSensors:
+class BoardSensors:
     """A force sensor, a tracker and pressure cells with the errors of ``Electronics``, read by a board that misses periods.
 
-    The force: gain, crosstalk and bias of the episode, low-pass, noise, converter, latency. The tracker: as ``lab``'s, with
-    scale and distortion of the episode about the place of registration, noise that grows with the distance from the
-    transmitter, and lost samples; ``position_time`` is worked out with the latency of the rig as described, which is wrong
-    where another one is drawn. Pressures: bias of the episode, noise, converter.
-    Acceleration, where the rig has such a sensor: gain and bias of the episode, low-pass, noise. In a missed period everything
-    that they say stays as it was, and so do the valves, which are commanded through a converter (``board_stage``).
+    The force: gain, crosstalk and bias of the episode, low-pass, noise, converter, latency. The tracker has a rate of its own,
+    noise and latency, scale and distortion of the episode about the place of registration, noise that grows with the distance
+    from the transmitter, and lost samples. No velocity is measured: in its place stands the low-passed difference of samples.
+    ``position_time`` is worked out with the latency of the rig as described, which is wrong where another one is drawn.
+    Pressures: bias of the episode, noise, converter. Acceleration, where the rig has such a sensor: gain and bias of the
+    episode, low-pass, noise. In a missed period everything that they say stays as it was.
     """
 
     sampled = True
-    drawn = tuple(f"electronics.{name}" for name in FIGURES)
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         self._electronics, self._ranges = electronics, {}  # type: tuple[Electronics, dict[str, tuple[float, float]]]
@@ -207,7 +185,6 @@ class HonestSensors:
         self._arrived: Array = np.zeros((tracker.Arrived.size, num_envs))
         self._passed: Array = np.zeros((2, num_envs))
         self._readings: Array = np.zeros((Readings.size, num_envs))
-        self._last: Array = np.zeros((4, num_envs))
         self._accelerometer: Array = np.zeros((acceleration.Accelerometer.size, num_envs))
         self._make_room()
 
@@ -221,29 +198,55 @@ class HonestSensors:
         self._queue: Array = np.zeros((slots, 3, lanes))
         self._late: Array = np.zeros((int(latest["force_latency"] / board.control_period + 1e-9) + 2, 2, lanes))
 
-    def vary(self, ranges: Mapping[str, tuple[float, float]]) -> None:
-        """From the next episode on draw what ``ranges`` name, as ``"electronics.force_bias"``, uniformly in (low, high)."""
-        self._ranges = {name.removeprefix("electronics."): ranges[name] for name in sorted(ranges)}
-        self._make_room()
-
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
         lanes: NDArray[Any] = np.atleast_1d(lane)
         self._keys[lane] = rng.integers(2**64, dtype=np.uint64)
-        unit = np.asarray(rng.uniform(-1.0, 1.0, Unit.size)).reshape(Unit.size, -1)
-        figures = Figures(np.empty((Figures.size, len(lanes))))
+        unit = np.asanyarray(rng.uniform(-1.0, 1.0, Unit.size)).reshape(Unit.size, -1)
+        figures = Figures(np.empty_like(unit, shape=(Figures.size, len(lanes))))
         for name in FIGURES:
             getattr(figures, name)[:] = getattr(self._electronics, name)
         for name, (low, high) in self._ranges.items():
             getattr(figures, name)[:] = rng.uniform(low, high)
-        errors = Errors(np.empty((Errors.size, len(lanes))))
-        work_out(figures, Unit(unit), Shared(self._shared), errors)
+        errors = Errors(np.empty_like(unit, shape=(Errors.size, len(lanes))))
+        over(work_out, figures, Unit(unit), Shared(self._shared), errors)
         # Drawn last, so that all else is drawn as on a rig without such a sensor.
         most = np.repeat([self._electronics.acceleration_bias, self._electronics.acceleration_gain_error], 2)
-        drawn = most[:, None] * np.asarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
+        drawn = most[:, None] * np.asanyarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
         errors.acceleration_bias[:], errors.acceleration_gain[:] = drawn[:2], drawn[2:]
         self._errors[:, lanes] = errors.rows
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
+        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
+        seen = np.zeros((Signals.size, len(time)))
+        Signals(seen).time[:] = time
+        cells = [(pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES)]
+        world = [(ticks[None], TICK), (motion, MOTION), (force, FORCE), *cells]
+        placed = [(np.ascontiguousarray(array, dtype=np.float64), row) for array, row in world]
+        Loop(len(time), placed, [(seen, 0)], [self.stage()]).run()
+        return measurement_of(seen, True, Shared(self._shared).share > 0.0)
+
+    def stage(self) -> Stage:
+        """``measure``, compiled into the closed loop."""
+        tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)
+        return Stage(_look, self._shared, tables=(*tables, self._readings, self._accelerometer))
+
+
+class HonestSensors(BoardSensors):
+    """``BoardSensors`` with all of their errors, whose figures episodes may draw. The valves are commanded through a converter,
+    and stay as they were in a missed period (``board_stage``)."""
+
+    drawn = tuple(f"electronics.{name}" for name in FIGURES)
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None:
+        super().__init__(electronics, num_envs)
+        self._last: Array = np.zeros((4, num_envs))
+
+    def vary(self, ranges: Mapping[str, tuple[float, float]]) -> None:
+        """From the next episode on draw what ``ranges`` name, as ``"electronics.force_bias"``, uniformly in (low, high)."""
+        self._ranges = {name.removeprefix("electronics."): ranges[name] for name in sorted(ranges)}
+        self._make_room()
 
     @property
     def figures(self) -> dict[str, Array]:
@@ -259,29 +262,13 @@ class HonestSensors:
         """By how much scale and distortion move what the tracker shows of true places, both (2, N), m."""
         return shift(Errors(self._errors), Shared(self._shared), place)
 
-    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
-        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
-        (world, seen), constants = looked_at(ticks, time, motion, pressures, force), Shared(self._shared)
-        accelerometer, arrived = acceleration.Accelerometer(self._accelerometer), tracker.Arrived(self._arrived)
-        kept = Kept(
-            self._keys, Errors(self._errors), self._queue, arrived, self._passed, self._late, Readings(self._readings),
-            accelerometer,
-        )  # fmt: skip
-        _honest(world, seen, constants, kept, len(time))
-        return measurement_of(seen.rows, True, constants.share > 0.0)
-
-    def stage(self) -> Stage:
-        """``measure``, compiled into the closed loop."""
-        tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)
-        return Stage(_honest_stage, self._shared, tables=(*tables, self._readings, self._accelerometer))
-
     def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
         """What reaches the valves of ``openings`` (4, N): converted, late by the clock's jitter, and not at all in a missed
         period."""
-        out = np.array(openings, dtype=np.float64)
-        _put_out(ticks, self._keys, Errors(self._errors), self._last, out)
+        out, tick = np.array(openings, dtype=np.float64, order="C"), np.array(ticks[None], dtype=np.float64)
+        Loop(len(ticks), [(tick, TICK)], [(out, OPENING)], [self.board_stage()]).run()
         return out
 
     def board_stage(self) -> Stage:
         """``put_out``, compiled into the closed loop."""
-        return Stage(_board_stage, tables=(self._keys.view(np.float64), self._errors, self._last))
+        return Stage(_put_out, tables=(self._keys.view(np.float64), self._errors, self._last))

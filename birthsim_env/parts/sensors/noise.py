@@ -27,6 +27,12 @@ def normal(key: np.uint64, tick: int, channel: int) -> float:
 
 
 @helper
+def noise_of(key: np.uint64, tick: int, channel: int, size: float) -> float:
+    """``normal`` with a standard deviation ``size``, of 0 where there is none."""
+    return size * normal(key, tick, channel) if size > 0.0 else 0.0
+
+
+@helper
 def happens(key: np.uint64, tick: int, channel: int, probability: float) -> bool:
     """Whether what has a ``probability`` happens at one tick, for one of 16 channels."""
     return probability > 0.0 and uniform(key, np.uint64(tick * 32 + 2 * channel)) < probability

@@ -139,3 +139,12 @@ class _Helper(CPUDispatcher):
 def helper(function: F) -> F:
     """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
     return kernel(function) if numba.config.DISABLE_JIT else _Helper(function)  # type: ignore[return-value, attr-defined]
+
+
+def over(function: Callable[..., Any], *arguments: Any) -> None:
+    """Run a kernel over arrays, or what has the rows of arrays, the last of which it writes; over symbols it is traced."""
+    written = getattr(arguments[-1], "rows", arguments[-1])
+    if hasattr(written, "trace_kernel"):
+        written.trace_kernel(function, *arguments)
+    else:
+        function(*arguments)

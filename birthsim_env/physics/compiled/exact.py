@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel, over
 
 PI = 3.141592653589793
 LOG2_E = 1.4426950408889634
@@ -70,8 +70,8 @@ def direction(angle: Any) -> tuple[Any, Any]:
     """cos and sin of an angle, rad, a number or an array (L,)."""
     if np.ndim(angle) == 0:
         return cosine(float(angle)), sine(float(angle))
-    rows = np.empty((2, len(angle)))
-    _directions(angle, rows)
+    rows = np.empty_like(angle, shape=(2, len(angle)))
+    over(_directions, angle, rows)
     return rows[0], rows[1]
 
 

@@ -4,7 +4,6 @@ They are one-sided at kinks: a spool at zero, an orifice that begins to choke, a
 turns.
 """
 
-import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,8 +17,6 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.gradients import steps
 from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, RIG
 from birthsim_env.physics.plant import Plant, checked
-from birthsim_env.physics.rig.parameters import Parameters, field_of
-from birthsim_env.physics.rig.values import shown
 
 
 @dataclass(frozen=True)
@@ -88,24 +85,3 @@ def _spread(result: Array) -> Array:
     rows = np.zeros((at.PARAMETERS, result.shape[1]))
     rows[list(RIG)] = result[INPUTS:]
     return rows
-
-
-FAR = 1e-40
-"""Of a parameter: the imaginary step of ``rig_jacobian``, whose square is nothing beside 1."""
-
-
-def rig_jacobian(parameters: Parameters, names: tuple[str, ...]) -> Array:
-    """d(row of ``Plant.lane_parameters``)/d(parameter), (PARAMETERS, len(names)), by complex steps, which are exact.
-
-    Dotted ``names`` of ``Parameters``. Raises ``ValueError`` for geometry, whose angles enter by sine and cosine, and choices.
-    """
-    columns = []
-    for name in names:
-        section, _, own = name.partition(".")
-        if section in ("geometry", "electronics") or field_of(name).metadata["choices"]:
-            raise ValueError(f"names has {shown(name)}; allowed: numbers of the rig other than geometry and electronics")
-        rig = copy.copy(parameters)
-        object.__setattr__(rig, section, copy.copy(getattr(rig, section)))
-        object.__setattr__(getattr(rig, section), own, getattr(getattr(rig, section), own) + 1j * FAR)
-        columns.append(np.array([np.imag(value) / FAR for value in at.rows_of(rig)], dtype=np.float64))
-    return np.stack(columns, axis=1)

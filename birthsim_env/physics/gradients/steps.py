@@ -15,7 +15,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
-from birthsim_env.physics.gradients.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 adjoint, adjoint_rig, tangent_rig = made.adjoint, made.adjoint_rig, made.tangent_rig
 
@@ -135,7 +135,7 @@ def backward(
             if k % steps == 0:
                 store(total[INPUTS - 2 : INPUTS], first, n, by_force[k // steps])
                 total[INPUTS - 2 : INPUTS] = 0.0
-        dynamics.copy(lam, total, n)
+        dynamics.copy(lam, total[: at.STATES], n)
         store(total, first, n, result)
 
 
@@ -179,7 +179,7 @@ def advance_tangent(
                 tangent_rig(x, u, f, p, s, out, n)
                 move(x, s, out, x0, s0, total, late, weight_of(stage, step), ahead_of(stage, step), n)
             dynamics.copy(total, x, n)
-            dynamics.copy(late, s, n)
+            dynamics.copy(late, s[: at.STATES], n)
         dynamics.settle(x, n)
         store(x, first, n, state)
         store(s, first, n, along)

@@ -1,7 +1,8 @@
 """Arrays of what helpers are traced on: symbols instead of numbers, for one lane, whose rows may be computed."""
 
 import math
-from collections.abc import Iterator
+import operator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -36,6 +37,50 @@ class Symbols(np.ndarray[Any, Any]):
         for where, value in np.ndenumerate(self):
             bits[where] = value.graph.node("bits", value)
         return np.ndarray.view(bits, Symbols)
+
+
+def _of_graph(operation: str) -> Callable[..., Any]:
+    def made(*arguments: Any) -> Any:
+        known = [one for one in arguments if isinstance(one, Value)]
+        return known[0].graph.node(operation, *arguments) if known else getattr(np, _NUMPY[operation])(*arguments)
+
+    return made
+
+
+_NUMPY = {"max": "maximum", "min": "minimum", "sqrt": "sqrt"}
+
+_UFUNCS: dict[Any, Callable[..., Any]] = {
+    np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul, np.divide: operator.truediv,
+    np.less: operator.lt, np.greater: operator.gt,
+    **{getattr(np, own): _of_graph(name) for name, own in _NUMPY.items()},
+}  # fmt: skip
+"""NumPy's operations, of one entry."""
+
+
+class Unknown(Symbols):
+    """``Symbols`` that NumPy's functions take as they take numbers: for code over lanes that is no kernel."""
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        if method != "__call__" or options or ufunc not in _UFUNCS:
+            return NotImplemented
+        entries = [np.asarray(one, dtype=object).view(np.ndarray) for one in inputs]
+        return np.asarray(np.frompyfunc(_UFUNCS[ufunc], ufunc.nin, 1)(*entries), dtype=object).view(Unknown)
+
+    def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> Any:
+        if function is np.where:
+            bare = [np.asarray(one, dtype=object).view(np.ndarray) for one in arguments]
+            return np.asarray(np.frompyfunc(_either, 3, 1)(*bare), dtype=object).view(Unknown)
+        return super().__array_function__(function, types, arguments, options)
+
+    def trace_kernel(self, kernel: Any, *arguments: Any) -> None:
+        """Run a kernel on symbols, which writes to these."""
+        from birthsim_env.physics.gradients.tracing import rewritten  # late: that module is made of this one
+
+        rewritten(kernel.py_func)(*arguments)
+
+
+def _either(condition: Any, yes: Any, no: Any) -> Any:
+    return condition.graph.select(condition, yes, no) if isinstance(condition, Value) else yes if condition else no
 
 
 class Picked:

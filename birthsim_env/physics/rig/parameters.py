@@ -11,7 +11,7 @@ import tomli_w
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.sections import Air, Chambers, Cylinder, Friction, Geometry, Mechanics, Valves
-from birthsim_env.physics.rig.values import in_line, is_finite, shown
+from birthsim_env.physics.rig.values import in_line, is_finite, near, shown
 
 __all__ = [
     "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters", "Valves", "field_of",
@@ -109,33 +109,32 @@ class Parameters:
         follow(parts, self, changes)
         return dataclasses.replace(self, **parts)
 
-    def to_dict(self) -> dict[str, dict[str, Any]]:
+    def to_dict(self, options: bool = False) -> dict[str, dict[str, Any]]:
         """All values as ``{section: {field: value}}``, and ``{"randomize": {name: [low, high]}}`` where there are ranges.
 
-        Options (``quantities.quantity``) are named where they differ from their defaults.
+        Without ``options`` these (``quantities.quantity``) are named only where they differ from their defaults.
         """
-        return self._sections(options=False)
-
-    def _sections(self, options: bool) -> dict[str, dict[str, Any]]:
         sections = {field.name: getattr(self, field.name).to_dict(options) for field in _parts(type(self))}
         return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
     @classmethod
-    def from_dict(cls, sections: dict[str, dict[str, Any]]) -> Self:
-        """Inverse of ``to_dict``; what is not named keeps its default."""
+    def from_dict(cls, sections: dict[str, Any]) -> Self:
+        """Inverse of ``to_dict``; ``"mechanics.mass"`` may name a value too. What is not named keeps its default."""
         changes = {}
         for section, values in sections.items():
-            if not isinstance(values, dict):
+            if "." in section:
+                changes[section] = values
+            elif not isinstance(values, dict):
                 raise ValueError(
                     f"{in_line(section)} = {shown(values)}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}"
                 )
-            if section != RANDOMIZE:
+            elif section != RANDOMIZE:
                 changes.update({f"{section}.{name}": value for name, value in values.items()})
         return dataclasses.replace(cls().replace(changes), ranges=_own_ranges(sections.get(RANDOMIZE, {})))
 
     def to_toml(self, path: str | Path) -> None:
         """Write every value to a TOML file, one table per part."""
-        Path(path).write_text(tomli_w.dumps(self._sections(options=True)), encoding="utf-8")
+        Path(path).write_text(tomli_w.dumps(self.to_dict(options=True)), encoding="utf-8")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
@@ -207,13 +206,13 @@ def field_of(dotted: str) -> dataclasses.Field[Any]:
         raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(_SECTIONS)}")
     fields = {field.name: field for field in dataclasses.fields(_SECTIONS[section])}  # type: ignore[arg-type]
     if name not in fields:
-        raise ValueError(f"unknown parameter {shown(dotted)}; allowed in {section}: {', '.join(fields)}")
+        raise ValueError(f"unknown parameter {shown(dotted)}{near(name, fields)}; allowed in {section}: {', '.join(fields)}")
     return fields[name]
 
 
 def load_parameters(parameters: Parameters | Mapping[str, Any] | str | Path | None) -> Parameters:
     """What ``parameters=`` accepts everywhere: nothing (defaults), a ``Parameters``, the path of a TOML file, or what such a
-    file holds as a mapping: ``{"mechanics": {"mass": 4.0}}``."""
+    file holds as a mapping: ``{"mechanics": {"mass": 4.0}}`` or ``{"mechanics.mass": 4.0}``."""
     if parameters is None:
         return Parameters()
     if isinstance(parameters, Parameters):

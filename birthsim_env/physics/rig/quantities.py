@@ -27,34 +27,22 @@ def quantity(
     drawn only where ``randomize`` or the owner's ``ranges`` name it.
     """
     metadata = {
-        "unit": unit,
-        "basis": basis,
-        "above": above,
-        "least": least,
-        "most": most,
-        "randomized": randomized,
-        "choices": choices,
-        "option": option,
-        "worth": worth,
-    }
+        "unit": unit, "basis": basis, "above": above, "least": least, "most": most, "randomized": randomized,
+        "choices": choices, "option": option, "worth": worth,
+    }  # fmt: skip
     return dataclasses.field(default=default, metadata=metadata)
-
-
-def _allowed(field: dataclasses.Field[Any]) -> str:
-    m = field.metadata
-    if m["choices"]:
-        return "one of " + ", ".join(repr(choice) for choice in m["choices"])
-    return f"a finite number{limits(m['above'], m['least'], m['most'])} ({m['unit']})"
 
 
 def _check_field(owner: str, field: dataclasses.Field[Any], value: Any) -> None:
     m = field.metadata
+    bounds = m["above"], m["least"], m["most"]
     if m["choices"]:
-        valid = isinstance(value, str) and value in m["choices"]
+        valid, allowed = isinstance(value, str) and value in m["choices"], f"one of {', '.join(map(repr, m['choices']))}"
     else:
-        valid = isinstance(value, (int, float)) and is_within(value, m["above"], m["least"], m["most"])
+        valid = isinstance(value, (int, float)) and is_within(value, *bounds)
+        allowed = f"a finite number{limits(*bounds)} ({m['unit']})"
     if not valid:
-        raise ValueError(f"{owner}.{field.name} = {shown(value)} is impossible; allowed: {_allowed(field)}")
+        raise ValueError(f"{owner}.{field.name} = {shown(value)} is impossible; allowed: {allowed}")
 
 
 class Part:

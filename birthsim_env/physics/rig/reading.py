@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,23 +33,22 @@ def read(name: str, path: str | Path, most: int = LARGEST) -> bytes:
 def read_toml(name: str, path: str | Path) -> dict[str, Any]:
     """The tables of a TOML file; ``ValueError`` names ``name`` and the file."""
     content = read(name, path)
-    try:
-        return tomllib.loads(content.decode("utf-8"))
-    except RecursionError:
-        words = "it nests too deeply"
-    except ValueError as error:
-        # Python's words on a number too long for it tell of functions to call.
-        words = "a number has too many digits" if "integer string conversion" in str(error) else " ".join(str(error).split())
-    raise ValueError(f"{name} = {named(path)} is no TOML: {words[:200]}")
+    tables: dict[str, Any] = _parsed(f"{name} = {named(path)} is no TOML", lambda: tomllib.loads(content.decode()), "TOML")
+    return tables
 
 
 def read_json(name: str, path: str | Path, most: int = LARGEST) -> Any:
     """What a JSON file holds; ``ValueError`` names ``name`` and the file."""
     content = read(name, path, most)
+    return _parsed(f"{name} = {named(path)} is damaged", lambda: json.loads(content), "JSON")
+
+
+def _parsed(said: str, parse: Callable[[], Any], kind: str) -> Any:
     try:
-        return json.loads(content)
+        return parse()
     except RecursionError:
         words = "it nests too deeply"
     except ValueError as error:
+        # Python's words on a number too long for it tell of functions to call.
         words = "a number has too many digits" if "integer string conversion" in str(error) else " ".join(str(error).split())
-    raise ValueError(f"{name} = {named(path)} is damaged: {words[:200]}; allowed: JSON")
+    raise ValueError(f"{said}: {words[:200]}; allowed: {kind}")

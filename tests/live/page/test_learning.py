@@ -37,8 +37,6 @@ def test_the_error_falls_and_the_rig_runs_what_is_known(chromium, server):
         window.wait(f"{LEARNS} && {SHOWN}")
         window.page.locator("#learn").click()
         window.wait(f"birthsim.learning.errors.length > {known}")
-        assert window.complaints == []
-        assert window.foreign == []
 
 
 def test_it_rests_while_nobody_looks(chromium, server):
@@ -63,6 +61,7 @@ def test_what_is_missing_is_named(chromium, server):
         window.page.locator("#learn").click()
         window.wait("document.querySelector('#notices').textContent.includes('learn.bin is missing (404)')")
         assert window.value(BUTTON) == LESSON
+        window.complaints.clear()  # of the browser, about the file
 
 
 @axe.NEEDED
@@ -91,5 +90,3 @@ def test_learned_to_the_end_it_gives_way_as_a_spring(chromium, server):
         window.live(2.0)
         window.hold(across=60)
         assert window.settle(least=10)["error_mm"] < 1.5
-        window.page.mouse.up()
-        assert window.complaints == []

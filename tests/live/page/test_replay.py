@@ -22,6 +22,7 @@ DROP = """([bytes, name]) => {
     window.dispatchEvent(event("drop"));
 }"""
 """What a browser does when somebody drops a file."""
+OTHER = Parameters().replace({"geometry.d6": 0.26, "valves.deadband": 0.02})
 NOTICES = "document.querySelector('#notices').textContent"
 
 
@@ -35,13 +36,13 @@ def drop(window, content, name="pull.rec"):
     window.page.evaluate(DROP, [content if isinstance(content, int) else base64.b64encode(content).decode(), name])
 
 
-def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures):
+def test_a_dropped_recording_is_played_searched_and_left(window, file):
     lesson = window.value("document.querySelector('#guide').value")
     drop(window, file.read_bytes())
     window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'pull.rec'")
     assert window.value("window.shaded && document.querySelector('#drop').hidden")
     assert not window.page.locator("#settings").is_visible()
-    window.page.locator("#pause").click()
+    window.pause()  # at its end it has halted by itself
     recording = load_recording(file)
     duration = recording.duration
     assert window.value("birthsim.state.duration") == pytest.approx(duration)
@@ -49,9 +50,7 @@ def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures)
     for time in (0.1, 0.998, 1.5, duration):
         window.page.evaluate(f"() => window.birthsim.send({{ type: 'seek', time: {time} }})")
         window.wait(f"Math.abs(birthsim.frame.time - {time}) < 1e-9")
-        frame, place = window.frame(), time / recording.interval
-        between = recording.rows[[int(place + 1e-6), min(int(place + 1e-6) + 1, len(recording.rows) - 1)]]  # a straight line
-        row = between[0] + (place - int(place + 1e-6)) * (between[1] - between[0])
+        frame, row = window.frame(), np.array([np.interp(time, recording.rows[:, 0], one) for one in recording.rows.T])
         for name in {*FIELDS} - {"pointer", "time"}:
             assert np.allclose(np.ravel(frame[name]), row[SLICES[name]], rtol=1e-5, atol=1e-7), (time, name)
         off = row[SLICES["position"]] - row[SLICES["compliant"]]
@@ -59,36 +58,25 @@ def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures)
         assert frame["linkage"][3] == pytest.approx(end_effector(row[SLICES["joints"]][:, None], recording.rig)[:, 0])
     assert "backstepping" in window.page.locator("#played").text_content()
     assert "Kclx 3000 N/m" in window.page.locator("#played").text_content()
-    window.page.screenshot(path=pictures / "dropped.png")
-    window.page.locator("#back").click()
-    window.wait("birthsim.hello.mode === 'live' && birthsim.frame.real_time !== null")
+    window.back()
+    window.wait("birthsim.frame.real_time !== null")
     assert window.page.locator("#settings").is_visible()
     assert window.value("document.querySelector('#guide').value") == lesson
     window.hold(across=30)
     window.wait("birthsim.frame.force[0] > 5")
-    window.page.mouse.up()
 
 
-def test_a_recording_can_be_chosen(window, file):
-    window.page.locator("#choose").set_input_files(file)
-    window.wait("birthsim.hello.mode === 'replay' && birthsim.frame.time > 0")
-    window.page.locator("#back").click()
-    window.wait("birthsim.hello.mode === 'live'")
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("foreign", "large", "shape")]
 
 
-@pytest.mark.parametrize(
-    "damage", ["checksum", *(pytest.param(name, marks=pytest.mark.slow) for name in ("foreign", "large", "shape"))]
-)
+@pytest.mark.parametrize("damage", ["checksum", *SLOW])
 def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
-    whole = file.read_bytes()
+    whole, other = file.read_bytes(), write_recording(tmp_path / "a.rec", example(9), OTHER).read_bytes()
     content, words = {
         "foreign": (b"PK this is no recording", "is damaged or foreign"),
         "checksum": (whole[:400] + bytes([whole[400] ^ 1]) + whole[401:], "has another checksum"),
         "large": (2**27 + 1, "allowed: up to 134217728"),
-        "shape": (
-            write_recording(tmp_path / "a.rec", example(9), Parameters().replace({"geometry.d6": 0.26})).read_bytes(),
-            "allowed: birthsim live --replay FILE",
-        ),
+        "shape": (other, "allowed: birthsim live --replay FILE"),
     }[damage]
     drop(window, content, f"{damage}.rec")
     window.wait(f"{NOTICES}.includes({words!r}) && {NOTICES}.includes('{damage}.rec')")
@@ -97,20 +85,18 @@ def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
 
 
 @pytest.mark.slow
-def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file):
-    drop(window, file.read_bytes() + struct.pack("<II", 1000, 0) + bytes(10))
-    window.wait("birthsim.hello.mode === 'replay' && birthsim.frame.time > 0")
-    window.page.locator("#back").click()
-    window.wait("birthsim.hello.mode === 'live'")
+def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file, tmp_path):
+    (tmp_path / "torn.rec").write_bytes(file.read_bytes() + struct.pack("<II", 1000, 0) + bytes(10))
+    window.play(tmp_path / "torn.rec")
+    window.wait("birthsim.frame.time > 0")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", [{}, {"geometry.d6": 0.26, "valves.deadband": 0.02}])
-def test_a_served_recording_of_any_rig_plays_by_itself_and_shows_all_curves(chromium, tmp_path, changes):
-    file = write_recording(tmp_path / "pull.rec", example(500), Parameters().replace(changes))
+@pytest.mark.parametrize("rig", [Parameters(), OTHER])
+def test_a_served_recording_of_any_rig_plays_by_itself_and_shows_all_curves(chromium, tmp_path, rig):
+    file = write_recording(tmp_path / "pull.rec", example(500), rig)
     with Server("live", "--replay", file) as server, Window(chromium, server.url) as viewer:
-        first = viewer.value("birthsim.plots.shown.history.view('time')[0]")
-        assert first == 0
+        assert viewer.value("birthsim.plots.shown.history.view('time')[0]") == 0
         assert viewer.page.locator("#file").text_content() == "pull.rec"
         assert not viewer.page.locator("#back").is_visible()
         viewer.wait("birthsim.state.paused")  # at its end
@@ -118,10 +104,8 @@ def test_a_served_recording_of_any_rig_plays_by_itself_and_shows_all_curves(chro
         last = viewer.value("['time', 'force_x'].map((name) => birthsim.plots.shown.history.view(name).at(-1))")
         row = recording.rows[round(last[0] / recording.interval)]
         assert last[1] == pytest.approx(row[SLICES["drag_force"]][0], rel=1e-5)
-        # From its end it would play on from wherever it is put.
-        viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
+        viewer.pause()  # from its end it would play on from wherever it is put
         viewer.page.locator("#scrub").fill("0.4")
         viewer.wait("Math.abs(birthsim.frame.time - 0.4) < 0.02")
         shown = "Number(document.querySelector('[data-figure=error] small').textContent.match(/[\\d.]+/)[0])"
         viewer.wait(f"Math.abs({shown} - birthsim.plots.shown.history.at('error_rms', 0.4)) < 0.006")
-        assert viewer.complaints == []

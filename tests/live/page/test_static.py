@@ -10,32 +10,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import COLUMNS, load_recording
 from birthsim_live.rig.folder import packed_page, write_page
 from tests.console import run as command
-from tests.live.browser import CALM, NARROW, Folder, Window
+from tests.live.browser import CALM, Folder, Window
 from tests.live.rig.worker import run
 
 pytestmark = pytest.mark.slow
-
-LARGEST = 1.8e6  # bytes
-SILENT = """async () => {
-  const { load } = await import(new URL("rig/birthsim.js", location));
-  const { Hub } = await import(new URL("worker/hub.js", location));
-  const pack = await (await fetch(new URL("rig/pack.json", location))).json();
-  const read = async (name) => (await fetch(new URL(`rig/${name}`, location))).arrayBuffer();
-  const [code, data] = [await read("loop.wasm"), await read("loop.bin")];
-  const bundle = await load({ code, data });
-  pack.numbers.patience = 0.2;
-  const held = [];
-  return new Promise((resolve) => {
-    const hub = new Hub(pack, bundle, ({ type, pointer }) => {
-      if (type === "frame") held.push(pointer !== null);
-      if (held.includes(true) && held.at(-1) === false) resolve(true);
-    });
-    setTimeout(() => resolve(false), 60e3);
-    hub.start();
-    hub.receive({ type: "drag", position: [0.53, 0], id: 1 });
-  });
-}"""
-"""True once a rig has let go of a hand that said a single word."""
 
 
 @pytest.fixture(scope="module")
@@ -49,33 +27,19 @@ def built(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def address(built):
-    """Of the page on a server of files, which has it below another folder."""
+def server(built):
+    """Of files, which has the page below another folder."""
     with Folder(built.parent) as served:
-        yield f"{served}{built.name}/"
-
-
-@pytest.fixture
-def window(chromium, address):
-    with Window(chromium, address + CALM) as opened:
-        opened.wait("birthsim.settings.controller === 'admittance-backstepping'")
-        yield opened
-        assert opened.complaints == []
-        assert opened.foreign == []
-
-
-def test_the_folder_is_small(built):
-    assert sum(path.stat().st_size for path in built.rglob("*") if path.is_file()) < LARGEST
+        served.url += f"{built.name}/"
+        yield served
 
 
 @pytest.mark.parametrize("compare", ["nothing", "backstepping"])
 def test_a_recorded_episode_has_the_bits_of_the_loop(window, tmp_path, compare):
     page = window.page
-    page.locator("select[name=compare]").select_option(compare)
-    window.wait(f"birthsim.settings.compare === '{compare}'")
-    page.locator("select[name=scenario]").select_option("circle")
+    window.choose(compare=compare, scenario="circle")
     page.locator("input[name=scenario_force]").check()
-    window.wait("birthsim.settings.scenario === 'circle' && birthsim.settings.scenario_force")
+    window.wait("birthsim.settings.scenario_force")
     window.live(0.3)
     page.locator("#record").click()
     window.wait("birthsim.state.recording !== null")
@@ -90,10 +54,9 @@ def test_a_recorded_episode_has_the_bits_of_the_loop(window, tmp_path, compare):
     with page.expect_download() as download:
         page.locator("#download").click()
     download.value.save_as(tmp_path / "circle.rec")
-    page.locator("#choose").set_input_files(tmp_path / "circle.rec")
-    window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'circle.rec' && birthsim.frame.time > 0")
-    page.locator("#back").click()
-    window.wait("birthsim.hello.mode === 'live'")
+    window.play(tmp_path / "circle.rec")
+    window.wait("birthsim.state.file === 'circle.rec' && birthsim.frame.time > 0")
+    window.back()
     recording = load_recording(tmp_path / "circle.rec")
     begun = int(np.argmin(recording.rows[:, 0]))
     rows = np.hstack([recording.rows, recording.second])[begun:]
@@ -109,37 +72,11 @@ def test_a_recorded_episode_has_the_bits_of_the_loop(window, tmp_path, compare):
     assert np.isfinite(rows[moved, COLUMNS]).all() == (compare != "nothing")
 
 
-def test_a_policy_of_ones_own_opens_the_page(chromium, address):
-    with Window(chromium, address) as window:
+def test_a_policy_of_ones_own_opens_the_page(chromium, server):
+    with Window(chromium, server.url) as window:
         window.wait("birthsim.settings.controller.endsWith('own') && birthsim.frame.lost === null")
         window.wait("document.querySelector('select[name=controller]').selectedOptions[0].text.includes('own')")
         window.live(0.2)
-        assert window.complaints == []
-
-
-def test_every_choice_runs_in_the_window(window):
-    for name in ("scenario", "controller", "valves", "sensors"):
-        choices = window.value(f"birthsim.hello.choices.{name}.filter((c) => !c.missing).map((c) => c.name ?? c)")
-        for choice in choices:
-            window.page.locator(f"select[name={name}]").select_option(choice)
-            window.wait(f"birthsim.settings.{name} === {choice!r}")
-            begun = window.frame()
-            window.wait(f"birthsim.frame.time > {begun['time'] + 0.1} || birthsim.frame.lost")
-            assert window.frame()["lost"] is None, (name, choice)
-
-
-def test_a_hand_that_falls_silent_lets_go(window):
-    assert window.page.evaluate(SILENT)
-
-
-def test_what_is_not_allowed_is_named_and_changes_nothing(chromium, address):
-    with Window(chromium, address, NARROW) as window:
-        window.wait("birthsim.settings.controller.endsWith('own')")  # the policy arrives after the page
-        before = window.value("birthsim.settings")
-        window.page.evaluate("() => window.birthsim.send({ type: 'set', settings: { mass: 900 } })")
-        window.wait("document.querySelector('#notices').textContent.includes('mass = 900; allowed: 1.5 to 6 kg')")
-        window.live(0.1)
-        assert window.value("birthsim.settings") == before
 
 
 def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
@@ -147,7 +84,7 @@ def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
     (folder / "rig" / "loop.wasm").unlink()
     with Folder(folder) as served:
         page = chromium.new_page()
-        page.goto(served)
+        page.goto(served.url)
         page.locator("#offline", has_text="loop.wasm is missing (404)").wait_for()
         page.close()
 
@@ -164,7 +101,7 @@ def test_in_a_long_page_only_a_rig_in_sight_runs(chromium, built):
     (built.parent / "long.html").write_text(f'<!doctype html>{frame}<div style="height: 5000px"></div>')
     page = chromium.new_page()
     with Folder(built.parent) as served:
-        page.goto(f"{served}long.html")
+        page.goto(f"{served.url}long.html")
         (inner,) = page.frames[1:]
 
         def becomes(paused):

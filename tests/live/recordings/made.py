@@ -9,7 +9,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import COLUMNS, EVERY, FIELDS, FORMAT, SLICES, packed
 
 INTERVAL = EVERY * 0.001
-SETTINGS = {"scenario": "circle", "controller": "pid", "Kclx": 2000.0, "mass": 3.0, "friction": 1.0, "scenario_force": False}
+SETTINGS = {
+    "scenario": "circle", "controller": "pid", "compare": "lqr", "Kclx": 2000.0, "mass": 3.0, "friction": 1.0,
+    "scenario_force": False,
+}  # fmt: skip
 
 
 def example(count: int, second: bool = False) -> np.ndarray:

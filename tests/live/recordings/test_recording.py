@@ -110,20 +110,16 @@ def test_a_file_that_holds_too_much_is_not_unpacked(file: Path, monkeypatch: pyt
             load_recording(file)
 
 
-@pytest.mark.parametrize(
-    ("limit", "content"),
-    [
-        ("WORDS", packed({"events": [{"row": 0, "settings": {str(k): 0 for k in range(1000)}}]})),
-        ("BRACKETS", packed({"events": [{}] * 1000})),
-        ("CHUNKS", packed({"events": []}) * 1000),
-    ],
-)
-def test_json_that_would_take_long_is_refused_before_it_is_read(
-    limit: str, content: bytes, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    header = file.read_bytes()
-    (tmp_path / "long.rec").write_bytes(header + content + packed({"events": [3]}))
-    most = {"WORDS": 8000, "BRACKETS": 900, "CHUNKS": 900}[limit]
+LONG = [
+    ("WORDS", 8000, packed({"events": [{"row": 0, "settings": {str(k): 0 for k in range(1000)}}]})),
+    ("BRACKETS", 900, packed({"events": [{}] * 1000})),
+    ("CHUNKS", 900, packed({"events": []}) * 1000),
+]
+
+
+@pytest.mark.parametrize(("limit", "most", "content"), LONG)
+def test_json_that_would_take_long_is_refused_before_it_is_read(limit, most, content, file, tmp_path, monkeypatch) -> None:
+    (tmp_path / "long.rec").write_bytes(file.read_bytes() + content + packed({"events": [3]}))
     assert len(load_recording(file).rows) > 1
     monkeypatch.setattr(recording, limit, most)
     with pytest.raises(ValueError, match=rf"long\.rec'.*allowed: up to {most}"):

@@ -27,6 +27,10 @@ OFFERED = [
 ]
 DEFAULT, WORN = Parameters(), Parameters().replace({"valves.deadband": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7})
 SOFT = Parameters().replace({"chambers.tube_length": 1.0, "air.supply_conductance": 2e-8, "mechanics.mode_frequency": 30.0})
+ANOTHER = {
+    "scenario": "circle", "scenario_force": True, "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve",
+}  # fmt: skip
+"""Settings of another rig, other setpoints, and one valve per cylinder."""
 FEW = {"backstepping", "admittance-backstepping", "residual:circle", "lqr"}
 
 
@@ -74,31 +78,24 @@ class Chosen(StiffnessSchedule):
 
 def expected(controller, settings, hold, rig):
     """What Gymnasium's environment does under such settings and such a hand."""
-    scenario, sensors = settings.get("scenario", "probe"), settings.get("sensors", "ideal")
-    friction, world = (
-        settings.get("friction", 1.0),
-        {"user_force": Hand(scenario, settings.get("scenario_force", False), **hold)},
-    )
+    scenario, friction = settings.get("scenario", "probe"), settings.get("friction", 1.0)
     changes = {"mechanics.mass": settings.get("mass", rig.mechanics.mass)}
     for name, cylinder in (("cylinder1", rig.cylinder1), ("cylinder2", rig.cylinder2)):
         changes[f"{name}.coulomb_friction"] = cylinder.coulomb_friction * friction
         changes[f"{name}.viscous_friction"] = cylinder.viscous_friction * friction
+    world = {"rig": rig, "parameters": rig.replace(changes), "valves": settings.get("valves", "two_valves")}
+    world["user_force"] = Hand(scenario, settings.get("scenario_force", False), **hold)
     if "Kclx" in settings:
         world["stiffness"] = Chosen(settings["Kclx"])
-    valves = settings.get("valves", "two_valves")
-    true = rig.replace(changes)
-    return loop_rows(scenario, sensors, controller, PERIODS, rig=rig, parameters=true, valves=valves, **world)[:, ROWS]
+    return loop_rows(scenario, settings.get("sensors", "ideal"), controller, PERIODS, **world)[:, ROWS]
 
 
 def check(page, *cases, rig=DEFAULT):
     """Cases of settings and a hand."""
-    steps = [
-        [("set", {"controller": "admittance-backstepping", **settings}), ("reset", None), ("hold", hold), ("advance", PERIODS)]
-        for settings, hold in cases
-    ]
+    cases = [({"controller": "admittance-backstepping", **settings}, hold) for settings, hold in cases]
+    steps = [[("set", settings), ("reset", None), ("hold", hold), ("advance", PERIODS)] for settings, hold in cases]
     for (settings, hold), told in zip(cases, run(page, *steps), strict=True):
-        law = settings.get("controller", "admittance-backstepping")
-        assert_same_bits(told[-1].rows[:, ROWS], expected(law, settings, hold or {}, rig))
+        assert_same_bits(told[-1].rows[:, ROWS], expected(settings["controller"], settings, hold or {}, rig))
         if "compare" in settings:
             assert_same_bits(told[-1].second_rows[:, ROWS], expected(settings["compare"], settings, hold or {}, rig))
 
@@ -107,10 +104,10 @@ def on_the_circle(name, sensors):
     return {"scenario": "circle", "controller": name, "sensors": sensors, "scenario_force": True}
 
 
-def test_a_law_a_policy_and_a_hand(page):
+def test_a_law_a_policy_hands_and_another_rig(page):
     check(
         page, (on_the_circle("backstepping", "lab"), None), (on_the_circle("residual:circle", "ideal"), None),
-        ({"controller": "backstepping", "compare": "admittance-backstepping"}, PULL),
+        ({"controller": "backstepping", "compare": "admittance-backstepping"}, PULL), (ANOTHER, HARD),
     )  # fmt: skip
 
 
@@ -127,21 +124,15 @@ def test_every_controller(page, sensors):
 
 
 @pytest.mark.slow
-def test_another_rig_other_setpoints_one_valve_and_hands(page):
-    rig = {"scenario": "circle", "mass": 4.3, "friction": 1.37, "scenario_force": True}
-    check(
-        page,
-        (rig, None),
-        ({**rig, "Kclx": 3150.0, "valves": "one_valve"}, None),
-        *(({}, one) for one in (PULL, FAR, PUSH, HARD)),
-    )
+def test_every_hand(page):
+    check(page, *(({**ANOTHER, "valves": "two_valves"}, one) for one in (None, PULL, FAR, PUSH, HARD)))
+
+
+PAIRS = [("backstepping", "admittance-backstepping"), ("residual:circle", "backstepping"), ("pid", "residual:circle_lab")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [("backstepping", "admittance-backstepping"), ("residual:circle", "backstepping"), ("pid", "residual:circle_lab")],
-)
+@pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_both_rigs_are_what_each_would_be_alone(page, one, other):
     check(page, ({**on_the_circle(one, "lab"), "compare": other, "mass": 4.0}, PULL))
 

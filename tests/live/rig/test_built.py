@@ -18,27 +18,15 @@ BUILT = PAGE / "rig"
 RENEW = "python -m birthsim_live.rig.build renews it"
 
 
-@pytest.fixture(scope="module")
-def fresh(tmp_path_factory):
+@pytest.mark.slow
+def test_a_fresh_build_is_equal(tmp_path):
     need_linker()
-    folder = tmp_path_factory.mktemp("built")
-    build(folder)
-    return folder
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["loop.wasm", "learn.wasm"])
-def test_code_is_equal_in_every_byte(fresh, name):
-    assert (BUILT / name).read_bytes() == (fresh / name).read_bytes(), RENEW
-
-
-@pytest.mark.slow
-def test_data_are_equal(fresh):
-    assert json.loads((BUILT / "pack.json").read_text()) == json.loads((fresh / "pack.json").read_text()), RENEW
-    built, made = (np.fromfile(folder / "loop.bin", dtype=np.int64) for folder in (BUILT, fresh))
+    build(tmp_path)
+    for name in ("loop.wasm", "learn.wasm", "learn.bin", "learn.json"):
+        assert (BUILT / name).read_bytes() == (tmp_path / name).read_bytes(), f"{name}: {RENEW}"
+    assert json.loads((BUILT / "pack.json").read_text()) == json.loads((tmp_path / "pack.json").read_text()), RENEW
+    built, made = (np.fromfile(folder / "loop.bin", dtype=np.int64) for folder in (BUILT, tmp_path))
     differs = np.flatnonzero(built != made)
-    for name in ("learn.bin", "learn.json"):
-        assert (BUILT / name).read_bytes() == (fresh / name).read_bytes(), RENEW
     # Other processors design a linear regulator with other rounding errors.
     np.testing.assert_allclose(*(words[differs].view(np.float64) for words in (built, made)), rtol=1e-6, err_msg=RENEW)
 

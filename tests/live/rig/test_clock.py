@@ -53,25 +53,13 @@ console.log(JSON.stringify(told));
 MOST_LAG = 0.05  # s
 
 
-@pytest.fixture(scope="module")
-def told(page):
-    return node(page, SCRIPT)
-
-
-def test_what_is_due_follows_the_wall_and_the_speed(told):
-    assert told["due"] == [4, 1, 0]
-
-
-def test_a_hiccup_is_caught_up_with_and_more_is_dropped_and_said(told):
-    assert told["hiccup"] == [40, 40, 51, pytest.approx(1.01 - MOST_LAG - 0.001), 0, 0]
-
-
-def test_lag_in_slow_motion_is_wall_time(told):
-    assert told["slow"] == pytest.approx(1.0 - MOST_LAG - 0.01)
-
-
-def test_the_factor_is_that_of_the_last_second(told):
-    # Of a machine that runs half of what is due, then all of it, and then none.
+def test_pace(page):
+    told = node(page, SCRIPT)
+    assert told["due"] == [4, 1, 0], "it follows the wall and the speed"
+    lost = 1.01 - MOST_LAG - 0.001
+    assert told["hiccup"] == [40, 40, 51, pytest.approx(lost), 0, 0], "it is caught up with, and more is dropped and said"
+    assert told["slow"] == pytest.approx(1.0 - MOST_LAG - 0.01), "in slow motion lag is wall time"
+    # Over the last second, of a machine that runs half of what is due, then all of it, and then none.
     assert told["factor"] == [None, *(pytest.approx(one, rel=0.01) for one in (0.5, 1.0, 2.0)), 0.0]
     behind, passed = told["behind"]
     assert behind == pytest.approx(passed / 2, rel=0.02)

@@ -35,22 +35,17 @@ def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine: str, tmp_path: Pa
     assert copied["exact"]["policy"] == copied["sampled"]["policy"]  # kept once
     assert copied["exact"]["policy"] != other["exact"]["policy"]
     write_page(tmp_path / "page", packed)
-    told = run(
-        tmp_path / "page",
-        [("set", {"controller": f"residual:{mine}", "scenario": "circle"}), ("reset", None), ("advance", 300)],
-    )
-    assert told[0][-1].lost is None
-    assert told[0][-1].settings["mass"] == 2.5
-    assert np.isfinite(told[0][-1].of("position")).all()
+    settings = {"controller": f"residual:{mine}", "scenario": "circle"}
+    end = run(tmp_path / "page", [("set", settings), ("reset", None), ("advance", 300)])[0][-1]
+    assert (end.lost, end.settings["mass"]) == (None, 2.5)
+    assert np.isfinite(end.of("position")).all()
 
 
 def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
     name = "circle_honest_student"
-    policy = controller_parts(ResidualController(RIG, name))["sampled"]["policy"]
+    memory = controller_parts(ResidualController(RIG, name))["sampled"]["policy"].stages[-1].memory
     cells = load_policy(best_policy(name)).network.cells
     assert cells > 0
-    memory = policy.stages[-1].memory
-    assert memory is not None
     np.testing.assert_array_equal(memory[:, 0], np.zeros(1 + cells))
 
 

@@ -3,29 +3,14 @@
 import numpy as np
 import pytest
 
-from birthsim_env.physics.compiled.lanes import (
-    BRISTLE_S0,
-    BRISTLE_S1,
-    FC1,
-    FC2,
-    FS1,
-    FS2,
-    FV1,
-    FV2,
-    MASS,
-    TN1,
-    TN2,
-    TP1,
-    TP2,
-    V1,
-    V2,
-)
+from birthsim_env.physics.compiled import lanes
 from birthsim_env.physics.geometry import amplification
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.stages import INSIDE, look_inside
 
-FRICTION = (FC1, FC2, FS1, FS2, FV1, FV2, BRISTLE_S0, BRISTLE_S1)
+FRICTION = [getattr(lanes, name) for name in ("FC1", "FC2", "FS1", "FS2", "FV1", "FV2", "BRISTLE_S0", "BRISTLE_S1")]
+TEMPERATURES = [lanes.TP1, lanes.TN1, lanes.TP2, lanes.TN2]
 
 
 def moving_plant(law: str) -> Plant:
@@ -51,9 +36,9 @@ def test_friction_is_what_the_pistons_lack_of_acceleration(law: str) -> None:
     w = (y1 + g.k1) ** 2 - g.d3**2 - g.d6**2
     kappa = amplification(y2 + g.k2, y1 + g.k1, 1 / np.sqrt((2 * g.d3 * g.d6) ** 2 - w**2))
     found = inside(plant)[:2]
-    plant.lane_parameters[list(FRICTION)] = 0.0
+    plant.lane_parameters[FRICTION] = 0.0
     free = plant.derivatives(plant.state, *still)
-    lack = (free - with_friction)[[V1, V2], 0] * plant.lane_parameters[MASS, 0] * [kappa**2, 1.0]
+    lack = (free - with_friction)[[lanes.V1, lanes.V2], 0] * plant.lane_parameters[lanes.MASS, 0] * [kappa**2, 1.0]
     assert found == pytest.approx(lack, rel=1e-9)
     assert (np.abs(found) > 5).all()
 
@@ -69,7 +54,7 @@ def test_flows_are_those_that_fill_the_chambers() -> None:
         lengths = halves + np.repeat(plant.piston[:, 0], 2) * [1, -1, 1, -1]
         areas = [rig.cylinder1.area_p, rig.cylinder1.area_n, rig.cylinder2.area_p, rig.cylinder2.area_n]
         volumes = rig.chambers.dead_volume + areas * lengths
-        return plant.pressures[:, 0] * volumes / (rig.air.gas_constant * plant.state[[TP1, TN1, TP2, TN2], 0])
+        return plant.pressures[:, 0] * volumes / (rig.air.gas_constant * plant.state[TEMPERATURES, 0])
 
     before = masses()
     plant.advance(plant.state[-4:].copy(), np.zeros((2, 1)), step)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT, LAYOUT
+from birthsim_build.layout import LAYOUT
 from birthsim_env.physics.compiled.lanes import parameter_array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import SLICES
@@ -44,9 +44,8 @@ def one(page, *steps: tuple[str, Any]) -> list[Told]:
 
 def test_displacement_is_force_over_stiffness_at_once(page) -> None:
     """Drag, read 2000 N/m; move the slider to 4000, and the displacement halves under one force."""
-    _, pulled, _, halved, _, released = one(
-        page, held(0.53, 0.0), ("advance", 1500), ("set", {"Kclx": 4000}), ("advance", 1500), ("hold", None), ("advance", 1000)
-    )
+    steps = held(0.53, 0.0), ("advance", 1500), ("set", {"Kclx": 4000}), ("advance", 1500), ("hold", None), ("advance", 1000)
+    _, pulled, _, halved, _, released = one(page, *steps)
     assert pulled.frame["rendered"][0] == pytest.approx(2000, rel=0.01)
     assert pulled.frame["rendered"][1] is None
     assert pulled.frame["drag_force"][0] == pytest.approx(20.0, rel=0.01)  # 1000 N/m against 2000 N/m, 30 mm apart
@@ -74,39 +73,16 @@ def test_a_change_keeps_state_time_and_motion(page) -> None:
         assert changes.items() <= end.settings.items()
 
 
-def test_mass_and_friction_change_the_rig(page) -> None:
-    changes = {
-        "mechanics.mass": 5.0, "cylinder1.coulomb_friction": 6.0, "cylinder2.coulomb_friction": 7.5,
-        "cylinder1.viscous_friction": 17.5, "cylinder2.viscous_friction": 17.5,
-    }  # fmt: skip
-    wanted = parameter_array(RIG.replace(changes), 1)[:, 0]
-    _, set_so, anew = run(page, [CALM, ("set", {"mass": 5.0, "friction": 0.5}), ("reset", None)])[0]
-    for told in (set_so, anew):
-        assert np.array_equal(told.rows[-1, : len(wanted)], wanted)
-
-
 @pytest.mark.slow
 def test_the_next_episode_follows_without_a_jump(page) -> None:
-    steps = [
-        ("set", {"scenario": "dystocia", "scenario_force": True, "controller": "pid"}),
-        ("reset", None),
-        ("advance", 60500),
-    ]
-    row = run(page, steps)[0][-1].row
+    world = {"scenario": "dystocia", "scenario_force": True, "controller": "pid"}
+    row = run(page, [("set", world), ("reset", None), ("advance", 60500)])[0][-1].row
     begins = int(np.flatnonzero(np.diff(row[:, SLICES["episode_time"]][:, 0]) < 0)[0])
     table = row[begins - 20 : begins + 40]
     assert np.all(np.diff(table[:, 0]) > 0)
     assert np.abs(np.diff(table[:, SLICES["target"]], axis=0)).max() < 1e-4
     assert np.abs(np.diff(table[:, SLICES["position"]], axis=0)).max() < 1e-4
     assert np.abs(np.diff(table[:, SLICES["stiffness"]], axis=0)).max() < 100
-
-
-@pytest.mark.parametrize(("pointer", "limited"), [([0.53, 0.01], False), ([3.5, 4.0], True)])
-def test_the_drag_is_a_saturated_spring_with_a_damper(page, pointer, limited) -> None:
-    told = one(page, ("set", {"drag_stiffness": 1500.0}), held(*pointer), ("advance", 30))[-1]
-    pull = 1500.0 * (pointer - told.of("position")) - DRAG_DAMPING * told.of("velocity")
-    assert np.abs(told.of("velocity")).max() > 0.01
-    assert told.of("drag_force") == pytest.approx(pull * DRAG_LIMIT / np.linalg.norm(pull) if limited else pull)
 
 
 def test_more_damping_is_a_slower_answer(page) -> None:
@@ -123,9 +99,8 @@ def test_more_damping_is_a_slower_answer(page) -> None:
 
 
 def test_a_lost_rig_waits_for_reset(page) -> None:
-    _, _, lost, still, reset, on = one(
-        page, ("advance", 5), ("put", ["Pp1", 3e6]), ("advance", 50), ("advance", 10), ("reset", None), ("advance", 10)
-    )
+    steps = ("advance", 5), ("put", ["Pp1", 3e6]), ("advance", 50), ("advance", 10), ("reset", None), ("advance", 10)
+    _, _, lost, still, reset, on = one(page, *steps)
     assert "pressure of chamber P1" in lost.lost
     assert (lost.done, still.done, still.halted) == (1, 0, True)
     assert (reset.lost, on.done) == (None, 10)
@@ -135,14 +110,8 @@ def test_a_lost_rig_waits_for_reset(page) -> None:
 
 
 def test_settings_show_the_setpoints_that_hold(page) -> None:
-    circle, moved, forceps = run(
-        page,
-        [
-            ("set", {"scenario": "circle"}),
-            ("set", {"Kclx": 3000.0}),
-            ("set", {"scenario": "forceps", "controller": "residual:circle"}),
-        ],
-    )[0]
+    settings = {"scenario": "circle"}, {"Kclx": 3000.0}, {"scenario": "forceps", "controller": "residual:circle"}
+    circle, moved, forceps = run(page, [("set", one) for one in settings])[0]
     assert (circle.settings["Kpneu1"], circle.settings["damping_applies"]) == (4600.0, True)
     names = ("stiffness_source", "Kclx", "Kcly", "Kpneu1")
     assert [moved.settings[name] for name in names] == ["sliders", 3000.0, 2000.0, 4600.0]
@@ -153,10 +122,8 @@ def test_settings_show_the_setpoints_that_hold(page) -> None:
 def test_what_is_compared_starts_anew_and_all_else_goes_on(page) -> None:
     others: list[dict[str, Any]] = [{"friction": 0.5}, {"scenario": "descent"}, {"scenario_force": True}, {"sensors": "lab"}]
     steps = [step for changes in others for step in (("set", changes), ("advance", 20))]
-    told = run(
-        page,
-        [("set", {"compare": "pid"}), ("advance", 50), *steps, ("set", {"compare": "lqr"}), ("set", {"compare": "nothing"})],
-    )[0]
+    beside = [("set", {"compare": name}) for name in ("pid", "lqr", "nothing")]
+    told = run(page, [beside[0], ("advance", 50), *steps, *beside[1:]])[0]
     for k in range(2, 2 + 2 * len(others), 2):
         assert told[k].of("time") == told[k - 1].of("time")
         assert np.array_equal(told[k + 1].second_row[-1, SLICES["target"]], told[k + 1].of("target"))
@@ -190,10 +157,7 @@ def test_a_row_holds_friction_and_flows(page) -> None:
 @pytest.mark.slow
 def test_on_the_heavy_rig_of_the_lesson_the_policy_takes_three_quarters_of_the_error(page):
     lesson = {"scenario": "circle", "scenario_force": True, "mass": 4.0, "friction": 1.5}
-    cases = [
-        [("set", {**lesson, "controller": name}), ("reset", None), ("advance", 8000)]
-        for name in ("backstepping", "residual:circle")
-    ]
-    law, policy = (told[-1].row for told in run(page, *cases))
-    errors = [np.sqrt(np.mean((row[:, SLICES["position"]] - row[:, SLICES["compliant"]]) ** 2)) for row in (law, policy)]
-    assert 3.0 < errors[0] / errors[1] < 5.0
+    cases = [[("set", {**lesson, "controller": name}), ("advance", 8000)] for name in ("backstepping", "residual:circle")]
+    rows = [told[-1].row for told in run(page, *cases)]
+    law, policy = (np.sqrt(np.mean((row[:, SLICES["position"]] - row[:, SLICES["compliant"]]) ** 2)) for row in rows)
+    assert 3.0 < law / policy < 5.0

@@ -42,12 +42,10 @@ def answered(ws: ClientConnection) -> bool:
     return len(ws.recv()) == 32
 
 
-HALVES = [
-    b"",
-    b"GET / HT",
-    b"GET / HTTP/1.1\r\nHost: 127.0.0.1",
+HALVES = (
+    *(b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1"),
     b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\n1",
-]
+)
 
 
 @pytest.mark.parametrize("half", HALVES)

@@ -26,41 +26,39 @@ from baselines.registry import make_controller
 
 class Law:
     def __init__(self, parameters):
-        self.own = make_controller("backstepping", parameters)
+        self.own, self.calls = make_controller("backstepping", parameters), 0
     def reset(self, lanes=None):
         pass
+    def before(self):
+        pass
     def command(self, measurement, reference):
-        return self.own.command(measurement, reference)
-
-class Fails(Law):
-    def command(self, measurement, reference):
-        return 1 / 0
-
-class Slow(Law):
-    def command(self, measurement, reference):
-        time.sleep(0.02)
-        return self.own.command(measurement, reference)
-
-class Hangs(Law):
-    def command(self, measurement, reference):
-        time.sleep(5.0)
-        return self.own.command(measurement, reference)
+        self.calls += 1
+        return self.own.command(measurement, reference) if self.before() is None else np.full((4, 1), 2.0)
 
 class Wide(Law):
-    def command(self, measurement, reference):
-        return np.full((4, 1), 2.0)
+    def before(self):
+        return 2.0
+
+class Fails(Law):
+    def before(self):
+        return self.calls / 0
+
+class Slow(Law):
+    def before(self):
+        time.sleep(0.02)
+
+class Hangs(Law):
+    def before(self):
+        time.sleep(5.0)
 """
 HELD = """
 from tests.live.server.test_controller import GOES_ON, HANGS, LET_GO
 
 class Held(Law):
-    calls = 0
-    def command(self, measurement, reference):
-        self.calls += 1
+    def before(self):
         if self.calls > 10:
             HANGS.set()
             GOES_ON.append(LET_GO.wait(60.0))
-        return self.own.command(measurement, reference)
 """
 HANGS, LET_GO = threading.Event(), threading.Event()
 GOES_ON: list[bool] = []
@@ -87,10 +85,10 @@ def test_it_answers_what_it_commands_in_a_loop(sensors: str, own: str, app: Call
             assert np.array_equal(np.frombuffer(ws.receive_bytes()), after[OPENING : OPENING + 4])
 
 
-@pytest.mark.parametrize(
-    ("kind", "said"),
-    [("Fails", "ZeroDivisionError: division by zero"), ("Wide", "command()[0, 0] = 2.0; allowed"), ("None", "has no 'None'")],
-)
+ENDS = {"Fails": "ZeroDivisionError: division by zero", "Wide": "command()[0, 0] = 2.0; allowed", "None": "has no 'None'"}
+
+
+@pytest.mark.parametrize(("kind", "said"), ENDS.items())
 def test_one_that_gives_up_says_why_and_is_closed(kind: str, said: str, own: str, app: Callable[..., ASGIApp], capfd) -> None:
     name = f"{own}:{kind}"
     with TestClient(app(name), base_url=HERE) as live, live.websocket_connect(SOCKET + name) as ws:

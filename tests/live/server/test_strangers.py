@@ -57,13 +57,8 @@ def test_addresses() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(ValueError, match=rf"port = {port} of 127.0.0.1 cannot be served \(.*\); allowed: a free port"):
             listen("127.0.0.1", port)
-    for every in ("0.0.0.0", "::", ""):
-        with pytest.raises(ValueError, match=r"allowed: one address or name|is unknown"):
-            listen(every, 0)
-    with pytest.raises(ValueError, match=r"host = 'no such host' is unknown"):
-        listen("no such host", 0)
-    assert is_loopback("127.0.0.1")
-    assert is_loopback("::1")
-    assert is_loopback("localhost")
-    assert not is_loopback("192.168.1.5")
-    assert not is_loopback("localhost.evil.example")
+    for host in ("0.0.0.0", "::", "", "no such host"):
+        with pytest.raises(ValueError, match=rf"host = '{host}' (means every address|is unknown)"):
+            listen(host, 0)
+    hosts = ("127.0.0.1", "::1", "localhost", "192.168.1.5", "localhost.evil.example")
+    assert [is_loopback(host) for host in hosts] == [True, True, True, False, False]

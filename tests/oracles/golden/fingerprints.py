@@ -23,10 +23,6 @@ FILE = Path(__file__).parent / "fingerprints.json"
 LANES, SEED = 3, 7
 PERIODS, STEPS = 800, 80
 
-EXCEPTIONS = {
-    "training": "PyTorch sums gradients in an order that depends on the processor",
-}
-"""What is not the same bits everywhere, and why."""
 
 
 def rows() -> dict[str, tuple[str, str, str]]:

@@ -103,7 +103,7 @@ ODD = """
 'import birthsim_env.observation'
 HIDDEN = "baselines.registry:make_controller"
 import birthsim_env.reward, numpy as np; from birthsim_env import info
-if True: import birthsim_env.success as s
+if True: import birthsim_env.scores as s
 def f():
     from birthsim_env.physics.compiled import ( # exact )
         lanes as l,  # )
@@ -119,7 +119,7 @@ def test_imports_stand_anywhere_and_names_in_strings_count_where_asked_for(tmp_p
     odd.write_text(ODD)
     found = {named: {path.relative_to(ROOT).as_posix() for path in imports(odd, named)} for named in (False, True)}
     assert found[False] == {
-        *(f"birthsim_env/{name}.py" for name in ("reward", "info", "success", "loop/rows")),
+        *(f"birthsim_env/{name}.py" for name in ("reward", "info", "scores", "loop/rows")),
         *(f"birthsim_env/physics/compiled/{name}.py" for name in ("lanes", "exact")),
     }  # fmt: skip
     assert found[True] - found[False] == {"baselines/registry.py"}

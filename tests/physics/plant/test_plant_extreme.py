@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.physics.plant.test_plant_properties import RANGES
 
 BORE, RING = math.pi * 0.025**2 / 4, math.pi * (0.025**2 - 0.010**2) / 4
 POLICY_PERIOD = 0.01
@@ -26,7 +26,7 @@ def corner_rigs(lanes: int, rng: np.random.Generator) -> list[Parameters]:
     """Every randomised field at one of its ends, LuGre and Coulomb friction in turn."""
     rigs = []
     for lane in range(lanes):
-        changes: dict[str, Any] = {name: float(rng.choice(ends)) for name, ends in RANGES.items()}
+        changes: dict[str, Any] = {name: float(rng.choice(ends)) for name, ends in documented_ranges(Parameters()).items()}
         rigs.append(Parameters().replace({**changes, "friction.law": ("lugre", "coulomb")[lane % 2]}))
     return rigs
 
@@ -65,11 +65,13 @@ def test_a_million_policy_steps_stay_finite_and_explained() -> None:
     plant = Plant(rigs, lanes)
     dead_volume = np.array([rig.chambers.dead_volume for rig in rigs])
     breakaway = plant.lane_parameters[[FS1, FS2]] / plant.lane_parameters[BRISTLE_S0]
-    outside, air, motion = 0, [], []
+    # Work of 200 N, of the bore at full supply and of the weight over the whole stroke, all into 2 kg.
+    outside, quickest = 0, math.sqrt(2 * (200 + 7e5 * BORE + 2 * 9.81) * 0.4 / 2)
     for command, force in rough_handling(lanes, steps, rng):
         plant.advance(command, force, POLICY_PERIOD)
         assert np.isfinite(plant.state).all()
         bar, kelvin, spool = plant.pressures / 1e5, plant.temperatures, plant.state[list(SPOOLS)]
+        assert np.all((bar > 0.02) & (bar < 250) & (kelvin > 120) & (kelvin < 1400))
         fraction = volume_fractions(plant, dead_volume)
         assert fraction.min() > 0, "an end stop gave way until a chamber had no volume left"
         squeezed, torn = bar > 20, bar < 0.2
@@ -79,23 +81,8 @@ def test_a_million_policy_steps_stay_finite_and_explained() -> None:
         bristle = np.abs(plant.state[[Z1, Z2]])
         assert np.all(bristle <= breakaway * (1 + 1e-9))
         assert not bristle[:, plant.lane_parameters[LUGRE] == 0].any()
-        air.append([bar.min(), bar.max(), kelvin.min(), kelvin.max()])
-        quick, deep = np.abs(plant.piston_speed), np.abs(plant.piston) - [[0.1], [0.2]]
-        motion.append([rows.max(axis=1) for rows in (quick, plant.impacts, deep)])
-    low, high = np.min(air, axis=0), np.max(air, axis=0)
-    speed, impact, depth = np.max(motion, axis=0)
-    print(
-        f"{low[0]:.3f} to {high[1]:.0f} bar, {low[2]:.0f} to {high[3]:.0f} K, speeds up to {speed} m/s, "
-        f"impacts up to {impact} m/s, {depth} m into the stops, "
-        f"outside 0.2 to 20 bar in {outside / (lanes * steps):.2%} of {lanes * steps} policy steps"
-    )
-    assert low[0] > 0.02
-    assert high[1] < 250
-    assert low[2] > 120
-    assert high[3] < 1400
-    # Work of 200 N, of the bore at full supply and of the weight over the whole stroke, all into 2 kg.
-    assert speed[1] < math.sqrt(2 * (200 + 7e5 * BORE + 2 * 9.81) * 0.4 / 2)
-    assert np.all(depth < [0.01, 0.005])
+        assert np.abs(plant.piston_speed[1]).max() < quickest
+        assert np.all(np.abs(plant.piston) < [[0.11], [0.205]])
     assert outside < 0.01 * lanes * steps
 
 
@@ -112,6 +99,5 @@ def test_extremes_are_the_equations_own() -> None:
         peaks = np.maximum(peaks, [coarse.pressures.max(axis=0), fine.pressures.max(axis=0)])
     assert (peaks[1] > 20e5).sum() >= 3, "some lane must have left the usual range"
     gap = np.abs(peaks[0] / peaks[1] - 1)
-    print(f"peaks up to {peaks[1].max() / 1e5:.0f} bar: median difference {np.median(gap):.1e}, largest {gap.max():.1e}")
     assert np.median(gap) < 1e-5
     assert gap.max() < 0.02

@@ -1,0 +1,137 @@
+"""An extended Kalman filter of one piston: where it is, how far its bristles are bent, and what force acts on it unseen.
+
+    y' = v,   v' = w (L + f - Fv v - s0 z - s1 z') + a0,   z' = v - s0 |v| z/G(v),   f' = noise
+with the chambers' force L known from pressures, the answer w to a force and the acceleration a0 without one. Friction is
+LuGre's. Position samples correct all four. A resting piston reveals f by its bristles, 20 um for 1 N, hence slowly; a sliding
+one by its acceleration. LuGre on an observed speed creeps under its noise; here the model alone moves the bristles at rest.
+"""
+
+from birthsim_env.physics import friction
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.physics.compiled.records import Rows, rows
+
+PUSH_NOISE, SPEED_NOISE = 3.0, 1e-6
+"""N2/s and m2/s3: densities of the noise that drives f and v; found by trial. At rest f is then averaged over 0.2 s."""
+
+ALERT, EXPECTED, SHARE = 100.0, 2.0, 0.1
+"""Samples that are further off than their noise explains make f noisier: by ``ALERT`` times what their squared innovations,
+averaged with the weight ``SHARE`` and in units of their variance, exceed ``EXPECTED``. Found by trial."""
+
+MOST_SURPRISE = 25.0
+"""assumed: no squared innovation counts for more, in units of its variance."""
+
+FIRST_PUSH, FIRST_BRISTLE = 1.0, 2.0
+"""N; assumed: standard deviations of f and of s0 z at a start."""
+
+
+LEAST_FRICTION = 1e-3
+"""N; a piston without friction is believed to have this, so that its bristles bend by a distance."""
+
+
+class Bristled(Rows):
+    """What is believed of both pistons, and the covariances of what is believed."""
+
+    position = rows("y1 y2", "m", "position")
+    speed = rows("v1 v2", "m/s", "speed")
+    bristle = rows("z1 z2", "m", "deflection of the bristles")
+    push = rows("f1 f2", "N", "force along the piston that is not known")
+    yy = rows("yy1 yy2", "m2", "covariance")
+    yv = rows("yv1 yv2", "m2/s", "covariance")
+    yz = rows("yz1 yz2", "m2", "covariance")
+    yf = rows("yf1 yf2", "N m", "covariance")
+    vv = rows("vv1 vv2", "m2/s2", "covariance")
+    vz = rows("vz1 vz2", "m2/s", "covariance")
+    vf = rows("vf1 vf2", "N m/s", "covariance")
+    zz = rows("zz1 zz2", "m2", "covariance")
+    zf = rows("zf1 zf2", "N m", "covariance")
+    ff = rows("ff1 ff2", "N2", "covariance")
+    surprise = rows("e1 e2", "1", "squared innovations over their variance, averaged")
+
+
+@helper
+def _slack(speed: float, coulomb: float, static: float, p: Rig) -> float:
+    """Deflection, m, at which a sliding piston's bristles stay."""
+    level: float = max(friction.stribeck_level(speed, coulomb, static, p.stribeck), LEAST_FRICTION) / p.s0
+    return level
+
+
+@helper
+def _way(speed: float) -> float:
+    """1 or -1, in which a piston goes."""
+    return 1.0 if speed > 0.0 else -1.0
+
+
+@helper
+def begin(b: Bristled, k: int, i: int, position: float, push: float, noise: float, p: Rig) -> None:
+    """Starts piston ``k`` of lane ``i`` at rest at a measured ``position``."""
+    b.position[k, i], b.speed[k, i], b.bristle[k, i], b.push[k, i] = position, 0.0, 0.0, push
+    b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i] = noise * noise, 0.0, 0.0, 0.0
+    b.vv[k, i], b.vz[k, i], b.vf[k, i] = 0.0, 0.0, 0.0
+    bent = min(FIRST_BRISTLE, p.fc1 if k == 0 else p.fc2) / p.s0
+    b.zz[k, i], b.zf[k, i], b.ff[k, i] = bent * bent, 0.0, FIRST_PUSH * FIRST_PUSH
+    b.surprise[k, i] = 1.0
+
+
+@helper
+def predict(b: Bristled, k: int, i: int, load: float, own: float, answer: float, p: Rig, period: float) -> None:
+    """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
+    forces; ``answer``, 1/kg, to a force."""
+    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
+    viscous = p.fv1 if k == 0 else p.fv2
+    most = max(static, LEAST_FRICTION) / p.s0
+    v, z = b.speed[k, i], max(-most, min(most, b.bristle[k, i]))
+    slack = _slack(v, coulomb, static, p)
+    kept = 1.0 / (1.0 + period * abs(v) / slack)
+    bends, relaxes = kept * (1.0 - _way(v) * z / slack), kept * abs(v) / slack
+    rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
+    step = period * answer
+    av, az, af = 1.0 - step * (viscous + p.s1 * bends), -step * (p.s0 - p.s1 * relaxes), step
+    v += period * rate
+    slack = _slack(v, coulomb, static, p)
+    kept = 1.0 / (1.0 + period * abs(v) / slack)
+    z = kept * (z + period * v)
+    bend = period * kept * (1.0 - _way(v) * z / slack)
+    bv, bz, bf = bend * av, kept + bend * az, bend * af
+    b.position[k, i] += period * v
+    b.speed[k, i], b.bristle[k, i] = v, z
+    yv, yz, yf = b.yv[k, i], b.yz[k, i], b.yf[k, i]
+    vv, vz, vf = b.vv[k, i], b.vz[k, i], b.vf[k, i]
+    zz, zf, ff = b.zz[k, i], b.zf[k, i], b.ff[k, i]
+    ay, by = av * yv + az * yz + af * yf, bv * yv + bz * yz + bf * yf
+    avv, avz, avf = av * vv + az * vz + af * vf, av * vz + az * zz + af * zf, av * vf + az * zf + af * ff
+    bvv, bvz, bvf = bv * vv + bz * vz + bf * vf, bv * vz + bz * zz + bf * zf, bv * vf + bz * zf + bf * ff
+    vv, vz, zz = (
+        av * avv + az * avz + af * avf + period * SPEED_NOISE,
+        bv * avv + bz * avz + bf * avf,
+        bv * bvv + bz * bvz + bf * bvf,
+    )
+    b.yy[k, i] += period * (2.0 * ay + period * vv)
+    b.yv[k, i], b.yz[k, i], b.yf[k, i] = ay + period * vv, by + period * vz, yf + period * avf
+    b.vv[k, i], b.vz[k, i], b.vf[k, i] = vv, vz, avf
+    b.zz[k, i], b.zf[k, i], b.ff[k, i] = (
+        zz,
+        bvf,
+        ff + period * PUSH_NOISE * (1.0 + ALERT * max(0.0, b.surprise[k, i] - EXPECTED)),
+    )
+
+
+@helper
+def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> None:
+    """Takes a position sample of piston ``k`` of lane ``i``: what it is off, m, and its standard deviation, m."""
+    yy, yv, yz, yf = b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i]
+    weight = 1.0 / (yy + noise * noise)
+    e = weight * innovation
+    b.surprise[k, i] += SHARE * (min(e * innovation, MOST_SURPRISE) - b.surprise[k, i])
+    b.position[k, i] += yy * e
+    b.speed[k, i] += yv * e
+    b.bristle[k, i] += yz * e
+    b.push[k, i] += yf * e
+    b.yy[k, i], b.yv[k, i] = yy - yy * yy * weight, yv - yy * yv * weight
+    b.yz[k, i], b.yf[k, i] = yz - yy * yz * weight, yf - yy * yf * weight
+    b.vv[k, i] -= yv * yv * weight
+    b.vz[k, i] -= yv * yz * weight
+    b.vf[k, i] -= yv * yf * weight
+    b.zz[k, i] -= yz * yz * weight
+    b.zf[k, i] -= yz * yf * weight
+    b.ff[k, i] -= yf * yf * weight

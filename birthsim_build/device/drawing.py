@@ -1,0 +1,124 @@
+"""What an episode draws, as one stage: the Python that draws it is run once, on symbols instead of numbers."""
+
+import copy
+import math
+from typing import Any
+
+import numpy as np
+
+from birthsim_build.device.loops import pieces_of
+from birthsim_build.device.program import Key, key_of
+from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.drawn.randomization import draw_rig
+from birthsim_env.parts.drawn.seeding import STREAMS, is_vectorised
+from birthsim_env.physics.compiled.lanes import Array, rows_of
+from birthsim_env.physics.gradients.graph import Graph
+from birthsim_env.physics.gradients.source import Output, loop, module_of
+from birthsim_env.physics.gradients.symbols import Unknown
+from birthsim_env.simulation import Simulation
+
+HEAD = '''"""Generated: what an episode draws."""
+
+import math
+
+import numpy as np
+
+from birthsim_build.code.drawing import bits, fractions, seeded, whole
+from birthsim_env.loop.rows import World
+from birthsim_env.loop.stage import scratch, table2
+from birthsim_env.loop.world import Start
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.gradients.source import choose
+
+'''
+
+BEGIN = """
+
+@kernel
+def begin(world: World, seen: int, own: Start, constants: int, tables: int, lane: int, n: int) -> int:
+"""
+
+
+class Symbolic:
+    """``Streams`` of one lane whose numbers are symbols of a ``graph``; a kernel of these ``lines`` draws them into rows."""
+
+    def __init__(self, graph: Graph, part: str) -> None:
+        self.graph, self.lines, self._part = graph, list[str](), part
+
+    def generators(self) -> Any:
+        """Asked for by what draws lane by lane."""
+        raise ValueError(f"{self._part}, drawn in Python; allowed on a device: what draws for all lanes at once")
+
+    def _drawn(self, count: int, line: str) -> Any:
+        first = rows_in(self.graph)
+        self.lines.append(line.format(first=first, beyond=first + count))
+        values = np.empty((count, 1), dtype=object)
+        values[:, 0] = [self.graph.input("drawn", first + k) for k in range(count)]
+        return values.view(Unknown)
+
+    def uniform(self, low: float = 0.0, high: float = 1.0, size: int | tuple[int, ...] = ()) -> Any:
+        """``Streams.uniform``."""
+        shape = (size,) if isinstance(size, int) else size
+        drawn = self._drawn(math.prod(shape), "fractions(state, drawn, {first}, {beyond}, n)")
+        return (float(low) + (float(high) - float(low)) * drawn).reshape(*shape, 1)
+
+    def integers(self, low: int, high: int | None = None, dtype: type = np.int64) -> Any:
+        """``Streams.integers``."""
+        first, beyond = (0, low) if high is None else (low, high)
+        if dtype is np.uint64:
+            return self._drawn(1, "bits(state, drawn, {first}, n)")[0]
+        if beyond - first == 1:
+            return np.full(1, first)
+        return self._drawn(1, f"whole(state, drawn, {{first}}, {first}, {beyond - first}, n)")[0]
+
+
+def rows_in(graph: Graph) -> int:
+    """How many rows have been drawn: all inputs of a graph."""
+    return sum(operation == "input" for operation, *_ in graph.nodes)
+
+
+def drawing(simulation: Simulation, own: Array) -> Stage:
+    """A stage that draws the world of an episode whose seed and number are in ``own`` (``Start.size``, N).
+
+    It writes rigs and tables, to the bits of ``Simulation.begin``. Raises ``ValueError`` for a part that draws in Python.
+    """
+    graph, outputs, tables, body = Graph(), list[Output](), list[Array](), list[str]()
+    parts = {
+        "reference": simulation.trajectory, "user_force": simulation.user_force, "stiffness": simulation.stiffness,
+        "sensors": simulation.sensors,
+    }  # fmt: skip
+    placed = {key_of(table) for stage in pieces_of(simulation).stages for table in stage.tables}
+    for number, name in enumerate(STREAMS):
+        part = parts.get(name)
+        streams: Any = Symbolic(graph, f"{name} = {type(part).__name__}")
+        if part is not None:
+            for table, symbols in _begun(part, placed, streams):
+                written = [(row, value) for row, value in enumerate(symbols.reshape(-1)) if value is not None]
+                outputs += [(f"table{len(tables)}", row, value) for row, value in written]
+                tables += [table.view(np.float64).reshape(-1, table.shape[-1])] if written else []
+        elif simulation.ranges:
+            rig = draw_rig(simulation.parameters, simulation.ranges, streams)
+            rows = (value[0] if np.ndim(value) else float(value) for value in rows_of(rig))
+            outputs += [("rig", row, value) for row, value in enumerate(rows)]
+        body += [f"seeded(own, {number}, state, n)", *streams.lines] if streams.lines else []
+    names = [f"table{k}" for k in range(len(tables))]
+    views = [f"table2(tables, {k})[:, mine]" for k in range(len(tables))]
+    room = f"scratch({max(1, rows_in(graph))}), scratch(5).view(np.uint64)"
+    body = [f"mine, drawn, state = slice(lane, lane + n), {room}", *body]
+    body += [f"fill({', '.join(['drawn', 'world.rig', *views, 'n'])})", "return 0"]
+    text = HEAD + loop(graph, "fill", ["drawn", "rig", *names], outputs) + BEGIN + "".join(f"    {line}\n" for line in body)
+    return Stage(module_of(text).begin, memory=own, tables=tuple(tables))
+
+
+def _begun(part: Any, placed: set[Key], streams: Any) -> list[tuple[Array, Any]]:
+    """The ``placed`` arrays of a part, and what its ``begin`` writes to them, for one lane."""
+    if not is_vectorised(part.begin):
+        streams.generators()
+    own, arrays = copy.copy(part), []
+    for name, array in vars(part).items():
+        if isinstance(array, np.ndarray) and key_of(array) in placed:
+            arrays.append((array, np.full((*array.shape[:-1], 1), None, dtype=object).view(Unknown)))
+            setattr(own, name, arrays[-1][1])
+    own.begin(np.zeros(1, dtype=np.intp), streams)
+    return arrays

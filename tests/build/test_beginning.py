@@ -1,0 +1,129 @@
+"""Episodes that begin on a device: what is drawn there, and where they start, has the bits of the native environment."""
+
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+
+from birthsim_build.code.compiler import compile_object
+from birthsim_build.device.beginning import beginning_with
+from birthsim_build.device.program import program_of
+from birthsim_env import ForceProfile, Parameters
+from birthsim_env.assembly import assemble
+from birthsim_env.episodes import Episodes
+from birthsim_env.loop.loop import Loop
+from birthsim_env.parts.hands.contractions import Contractions
+from birthsim_env.parts.references import Circle
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.sensors.sensors import SENSORS
+from tests.build.targets import need_device, need_threads
+from tests.build.test_device import assert_equal, assert_same_run
+from tests.build.test_threads import assert_exact
+
+SEED = 2_200_000
+
+OPTIONS = Parameters().replace({
+    "air.supply_conductance": 1e-8, "mechanics.mode_frequency": 20.0, "chambers.tube_length": 1.0, "valves.hysteresis": 0.02,
+    "electronics.acceleration_bandwidth": 50.0,
+})  # fmt: skip
+
+CASES = {
+    **{f"{name} {sensors}": (name, {"sensors": sensors}) for name in SCENARIOS for sensors in SENSORS},
+    **{hand: ("probe", {"user_force": hand}) for hand in ("sine", "noise", "guided")},
+    "options": ("circle", {"parameters": OPTIONS, "sensors": "lab"}),
+    "options, honest, no force sensor": ("forceps", {"parameters": OPTIONS, "sensors": "honest", "force_sensor": False}),
+    "sensors": ("probe", {"randomize": "sensors", "sensors": "honest"}),
+    "nothing drawn": ("descent", {"randomize": False}),
+    "two fields": ("vacuum", {"randomize": {"mechanics.mass": (2.0, 3.0), "cylinder1.piston_diameter": (0.031, 0.032)}}),
+    "contractions": ("probe", {"user_force": Contractions((-9.0, 9.0), 3, 1.3, (0, 9), (0.1, 0.9), 2.1)}),
+}
+
+
+def made(device, case, lanes, **more):
+    scenario, arguments = CASES[case]
+    given = {"randomize": True, **arguments, **more}
+    return gymnasium.make_vec(environment_id(scenario), num_envs=lanes, device=device, **given)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("device", ["host", "cuda"])
+@pytest.mark.parametrize("case", CASES)
+def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
+    need_threads()
+    need_device(device)
+    envs = [made(where, case, 33, max_episode_steps=3) for where in (None, device)]
+    assert_same_run(*envs, 8, staggered=True)
+    # Anywhere, by seeds of 64 bits, and again by the seeds of before.
+    for given in ({"seed": [2**64 - 1 - k for k in range(33)]}, {"options": {"position": (0.51, 0.01)}}):
+        assert_equal(*(env.reset(**given)[0] for env in envs))
+    assert_equal(*(env.unwrapped.plant_state for env in envs))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lanes", [1, 1000])
+def test_many_and_one(lanes):
+    need_threads()
+    assert_same_run(*(made(device, "circle honest", lanes, max_episode_steps=2) for device in (None, "host")), 4)
+
+
+@pytest.mark.slow
+def test_ptx_of_a_beginning_is_exact_and_alone(tmp_path):
+    need_threads()
+    for k, case in enumerate(("circle honest", "options", "contractions", "noise")):
+        scenario, arguments = CASES[case]
+        many, other = (Episodes(assemble(lanes, scenario, **{"randomize": True, **arguments})) for lanes in (3, 2))
+        pieces = beginning_with(many)
+        program = program_of(pieces, beginning_with(other), pieces.functions)
+        compile_object(pieces.functions, "ptx", tmp_path / f"{k}.o", threads=program.threads)
+        text = (tmp_path / f"{k}.ptx").read_text()
+        assert_exact(text)
+        assert re.findall(r"^\.visible \.entry birthsim_(\w+)", text, re.MULTILINE)[-2:] == ["advance", "begin"]
+
+
+class Taps(ForceProfile):
+    """A user's hand that is compiled, with a number of knots of its own in every episode."""
+
+    def knots(self, rng):
+        return [(0.0, 0.0, 0.0), *((0.01 * k, rng.uniform(-20, 20), 0.0) for k in range(1, rng.integers(2, 30)))]
+
+
+class Wandering(Circle):
+    """A user's circle that is compiled, with a centre of its own in every episode."""
+
+    def begin(self, lane, rng):
+        super().begin(lane, rng)
+        self._own[0, lane] += rng.normal(scale=1e-3)
+
+
+def test_what_no_device_draws_is_refused_by_name():
+    for name, part in {"user_force": Taps(), "reference": Wandering()}.items():
+        said = rf"{name} = {type(part).__name__}, drawn in Python; allowed on a device: what draws for all lanes at once"
+        with pytest.raises(ValueError, match=said):
+            made("host", "circle ideal", 2, **{name: part})
+    env = made("host", "nothing drawn", 2)
+    with pytest.raises(ValueError, match=rf"seed = {2**64}; allowed with a device: below 2\^64"):
+        env.reset(seed=[2**64, 0])
+    with pytest.raises(ValueError, match=r"position = \(2, 0\) m is unreachable"):
+        env.reset(seed=0, options={"position": (2.0, 0.0)})
+
+
+@pytest.mark.parametrize("case", ["circle honest", "nothing drawn"])
+def test_stages_begin_a_block_as_a_simulation_does(case):
+    """The stages alone, over a block of lanes here."""
+    scenario, arguments = CASES[case]
+    lanes = 5
+    episodes = Episodes(assemble(lanes, scenario, **{"randomize": True, **arguments}))
+    pieces = beginning_with(episodes)
+    numbers = np.arange(3, 3 + lanes)
+    episodes.begin_first([SEED + lane for lane in range(lanes)], numbers)
+    arrays = pieces.arrays()
+    expected = [array.copy() for array in arrays]
+    episodes.begin_first([0] * lanes, np.zeros(lanes, dtype=np.int64))
+    episodes.forget(np.ones(lanes, dtype=bool))
+    words = pieces.beginning[0].memory.view(np.uint64)
+    words[0], words[1] = SEED + np.arange(lanes), numbers
+    Loop(lanes, pieces.world, pieces.seen, pieces.beginning).run()
+    for array, one in zip(arrays, expected, strict=True):
+        if array is not pieces.beginning[0].memory:
+            assert array.tobytes() == one.tobytes()

@@ -1,0 +1,107 @@
+"""The filter that finds an unseen force on a piston by its bristles: against a LuGre piston of SciPy, and differences."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from baselines.estimation import bristle_filter
+from baselines.estimation.bristle_filter import Bristled
+from birthsim_env.physics.compiled.lanes import Rig, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
+
+RIG = Parameters()
+P = Rig(parameter_column(RIG))
+MASS, PERIOD, NOISE = RIG.mechanics.mass, 1e-3, 1e-4
+COULOMB, VISCOUS = RIG.cylinder2.coulomb_friction, RIG.cylinder2.viscous_friction
+S0, S1, STRIBECK = RIG.friction.bristle_stiffness, RIG.friction.bristle_damping, RIG.friction.stribeck_speed
+STATE, COVARIANCE = Bristled.yy.first, ("yy", "yv", "yz", "yf", "vv", "vz", "vf", "zz", "zf", "ff")
+
+
+def piston(time, force):
+    """Positions, m, of a LuGre piston under ``force(t)``, N, from rest."""
+
+    def rates(t, state):
+        _, v, z = state
+        level = COULOMB * (1.0 + (RIG.friction.static_ratio - 1.0) / (1.0 + (v / STRIBECK) ** 2))
+        bend = v - S0 * abs(v) * z / level
+        return v, (force(t) - S0 * z - S1 * bend - VISCOUS * v) / MASS, bend
+
+    found = solve_ivp(rates, (0.0, time[-1]), np.zeros(3), t_eval=time, method="LSODA", rtol=1e-8, atol=1e-12, max_step=1e-3)
+    return found.y[0]
+
+
+def found(load, push, seconds, seed):
+    """Force, N, that the filter finds at each period where chambers push with ``load(t)`` and a hand with ``push(t)``."""
+    time = np.arange(round(seconds / PERIOD)) * PERIOD
+    path, rng = piston(time, lambda t: load(t) + push(t)), np.random.default_rng(seed)
+    b, forces = Bristled(np.zeros((Bristled.size, 1))), np.empty(len(time))
+    bristle_filter.begin(b, 1, 0, path[0], 0.0, NOISE, P)
+    for k, t in enumerate(time):
+        bristle_filter.predict(b, 1, 0, load(t - PERIOD / 2), 0.0, 1.0 / MASS, P, PERIOD)
+        if k % 4 == 0:
+            bristle_filter.correct(b, 1, 0, path[k] + NOISE * rng.standard_normal() - b.position[1, 0], NOISE)
+        forces[k] = b.push[1, 0]
+    return time, forces
+
+
+@pytest.mark.parametrize("size", [4.0, 9.0])
+def test_a_push_below_break_away_is_found_by_the_bristles(size):
+    found_of_seed = []
+    for seed in range(6):
+        time, forces = found(lambda t: 0.0, lambda t: size if t > 1.0 else 0.0, 3.0, seed)
+        found_of_seed.append(forces[time > 2.0].mean())
+    # LuGre's bristles yield before they break away, which one linear correction takes for up to a third more of a push.
+    # 250 samples of 0.1 mm leave 0.3 N of the mean of f, and f is thought to wander by sqrt(3) N in a second.
+    assert np.std(found_of_seed) < 1.2
+    assert size - 0.5 < np.mean(found_of_seed) < 4 / 3 * size + 0.5
+
+
+def test_a_hand_that_makes_the_piston_slide_is_found_beyond_its_friction():
+    # The chambers hold all but a little of what the hand pulls with, which is three times the friction.
+    time, forces = found(lambda t: -26.0 if t > 0.5 else 0.0, lambda t: 45.0 if t > 0.5 else 0.0, 1.2, 1)
+    assert forces[time > 1.0] == pytest.approx(45.0, abs=3.0)
+
+
+@pytest.mark.parametrize("speed", [0.003, -0.2])
+def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
+    """P' = A P A^T + Q with A from central differences of the step itself."""
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((4, 4)) * np.array([1e-4, 1e-2, 3e-5, 2.0])[:, None]
+    before, start = root @ root.T, np.array([0.01, speed, 1e-4 * np.sign(speed), 5.0])
+
+    def step(state, covariance=before):
+        b = Bristled(np.zeros((Bristled.size, 1)))
+        b.position[1], b.speed[1], b.bristle[1], b.push[1] = state
+        b.surprise[1] = 1.0
+        for name, (i, j) in zip(COVARIANCE, zip(*np.triu_indices(4), strict=True), strict=True):
+            getattr(b, name)[1] = covariance[i, j]
+        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, P, PERIOD)
+        after = np.zeros((4, 4))
+        after[np.triu_indices(4)] = [getattr(b, name)[1, 0] for name in COVARIANCE]
+        return np.array([b.position[1, 0], b.speed[1, 0], b.bristle[1, 0], b.push[1, 0]]), after
+
+    sizes = np.array([1e-7, 1e-6, 1e-8, 1e-4])
+    slopes = np.transpose([(step(start + e)[0] - step(start - e)[0]) / (2 * e.sum()) for e in np.diag(sizes)])
+    expected = slopes @ before @ slopes.T
+    expected[1, 1] += PERIOD * bristle_filter.SPEED_NOISE
+    expected[3, 3] += PERIOD * bristle_filter.PUSH_NOISE
+    scale = np.sqrt(np.diag(expected))
+    # The filter leaves out how the level of friction changes with speed, and how the relaxation does within a period.
+    upper = np.triu_indices(4)
+    np.testing.assert_allclose(
+        (step(start)[1] / np.outer(scale, scale))[upper], (expected / np.outer(scale, scale))[upper], atol=0.05
+    )
+
+
+def test_a_piston_without_friction_is_followed():
+    p = Rig(parameter_column(RIG.replace({"cylinder2.coulomb_friction": 0.0})))
+    b = Bristled(np.zeros((Bristled.size, 1)))
+    bristle_filter.begin(b, 1, 0, 0.0, 0.0, NOISE, p)
+    position, speed = 0.0, 0.0
+    for k in range(500):
+        speed += PERIOD * (6.0 - VISCOUS * speed) / MASS
+        position += PERIOD * speed
+        bristle_filter.predict(b, 1, 0, 0.0, 0.0, 1.0 / MASS, p, PERIOD)
+        if k % 4 == 0:
+            bristle_filter.correct(b, 1, 0, position - b.position[1, 0], NOISE)
+    assert b.push[1, 0] == pytest.approx(6.0, abs=0.3)

@@ -1,0 +1,51 @@
+"""Rigs that differ from the default one in whatever a formula may depend on."""
+
+import pytest
+
+from birthsim_env.physics.rig.parameters import Parameters
+
+LAWS = ("lugre", "coulomb", "elasto_plastic")
+NO_FRICTION = {
+    **{f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "viscous")},
+    "friction.law": "coulomb",
+}
+MOVED = {
+    **{"cylinder1.coulomb_friction": 9.0, "cylinder1.viscous_friction": 20.0, "cylinder2.viscous_friction": 50.0},
+    **{"cylinder2.piston_diameter": 0.03, "cylinder1.rod_diameter": 0.008, "mechanics.mass": 2.5},
+}
+"""Cylinders that differ in everything, so that no figure of one may stand for the other's."""
+
+OTHER = {
+    **{"geometry.gamma3": 1.3, "geometry.d3": 0.4, "geometry.d6": 0.22, "geometry.k1": 0.44, "geometry.k2": 0.55},
+    **{"cylinder1.piston_diameter": 0.032, "cylinder2.rod_diameter": 0.012, "mechanics.mass": 4.0, "mechanics.gravity": 9.7},
+    **{"friction.static_ratio": 1.6, "friction.stribeck_speed": 0.01, "friction.bristle_damping": 90.0},
+    **{"chambers.dead_volume": 2e-5, "chambers.wall_heat_transfer": 80.0, "chambers.piston_conductance": 0.1},
+    **{"valves.critical_ratio": 0.4, "valves.time_constant": 0.003, "valves.leakage_ratio": 0.02},
+    **{"air.supply_pressure": 6e5, "air.temperature": 300.0, "air.atmospheric_pressure": 0.95e5},
+}
+DEMANDING = {
+    **{"cylinder1.coulomb_friction": 25.0, "cylinder2.coulomb_friction": 6.0, "mechanics.mass": 2.0},
+    **{"chambers.dead_volume": 5e-6, "chambers.wall_heat_transfer": 100.0, "valves.time_constant": 0.0015},
+}
+"""A corner of the ranges of domain randomisation: light, tight and quick, so that the integrator has least to spare."""
+
+TILTED = Parameters().replace(
+    {
+        **{"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.2},
+        **{"cylinder1.viscous_friction": 55.0, "cylinder2.coulomb_friction": 22.0, "cylinder2.rod_diameter": 0.012},
+        **{"air.temperature": 310.0, "air.polytropic_index": 1.3},
+        **{"chambers.dead_volume": 1.7e-5, "valves.time_constant": 0.006},
+    }
+)
+LINKAGES = {
+    "default": Parameters(),
+    "tilted pivot": TILTED,
+    "d6 longer than d3": Parameters().replace({"geometry.d3": 0.25, "geometry.d6": 0.35, "geometry.gamma3": 2.4}),
+    "pivot below": Parameters().replace(
+        {
+            **{"geometry.gamma3": -2.0, "geometry.k2": 0.6, "mechanics.mass": 4.3, "mechanics.gravity": 1.62},
+            **{"cylinder1.piston_diameter": 0.04, "cylinder2.rod_diameter": 0.02, "chambers.dead_volume": 2e-5},
+        }
+    ),
+}
+each_rig = pytest.mark.parametrize("rig", LINKAGES.values(), ids=LINKAGES.keys())
