@@ -83,13 +83,8 @@ def test_rows_by_number_are_found():
     assert not list(rows_by_number(f"def k(x):\n  {body}"))
 
 
-GIVEN = {
-    "birthsim_env/loop/world.py": {"motion[2 + axis, i]", *(f"joints[{k}, i]" for k in range(4))},
-    "birthsim_env/parts/hands/contractions.py": {"waves[0, place]", "force[0, i]", "force[1, i]", "times[low + 1]"},
-    "birthsim_env/parts/hands/user_forces.py": {"knots[min(low + 1, count - 1)]"},
-    "baselines/estimation/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)},
-}
-"""Arguments that are one named group of whoever calls, and tables whose first index is a place in time."""
+GIVEN = {"baselines/estimation/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)}}
+"""Arguments that are one named group of whoever calls, x and y."""
 
 
 def test_kernels_name_their_rows():
