@@ -22,7 +22,8 @@ RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
 POLICIES = [f"residual[policy={name}]" for name in shipped_names()]
 CHOICES = [*LISTED, *(name for name in controller_names() if name not in CONTROLLERS)]
-NAMES = [*CHOICES, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
+IDENTIFIED = "admittance[force_sensor=false,identified=true]"
+NAMES = [*CHOICES, IDENTIFIED, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [
     pytest.param(name, sensors, RIG, id=f"{name}-{sensors}")
     for name in NAMES for sensors in SENSORS

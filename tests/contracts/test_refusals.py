@@ -10,7 +10,7 @@ import pytest
 
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, override
-from baselines import BacksteppingController
+from baselines import AdmittanceController, BacksteppingController
 from baselines.bench.evaluation import evaluate
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import make_controller
@@ -214,6 +214,7 @@ TABLE = [
             (both, "sensors", ("none",), "'ideal', 'lab'"),
         ]
     ),
+    (AdmittanceController, "identified", (True,), "force_sensor is False"),
     (BacksteppingController, "valves", ("three",), "two_valves, one_valve"),
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),

@@ -109,3 +109,14 @@ def test_a_head_heavier_than_five_kilograms_rests_with_less_gain(mass, rest_gain
     assert told("admittance-adaptive", True, rest_gain=50.0) == 50.0, "a gain that is asked for is what it has"
     assert told("admittance-adaptive", False) == 90.0
     assert told("admittance-sensorless", True) == 45.0
+
+
+def test_known_friction_lets_the_head_rest_without_a_force_sensor() -> None:
+    """Rows of issue 32, honest sensors, the rig known: within 4 % of the stiffness, 0.2 mm at rest, 25 l/min of air."""
+    law = make_controller("admittance[force_sensor=false,identified=true]", RIG)
+    found = evaluate("BirthSIM/Probe-v2", law, "identified", 16, 91_000, progress=False, sensors="honest", randomize=False)
+    figures = {name: found.summary()[name]["median"] for name in ("stiffness_error", "unrest", "air")}
+    assert abs(figures["stiffness_error"]) < 4.0
+    assert figures["unrest"] < 0.2
+    assert figures["air"] < 25.0
+    assert not any(found.lost)
