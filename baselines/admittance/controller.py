@@ -146,14 +146,8 @@ class AdmittanceController(StagedController):
             tuned, least, falls = {**tuned, "rest_gain": lighter * tuned["rest_gain"]}, SAMPLED_LEAST, MOST_FALLS
         g = {**tuned, **self._own}
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
-        follow = {
-            "pneumatic_gain": PNEUMATIC_GAIN,
-            "quickness": quickness,
-            "least_fraction": least,
-            "most_falls": falls,
-            "swing": 0.0 if inert or self._force_sensor else SWING,
-            **g,
-        }
+        calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
+        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
         about = knowledge.beliefs(
             rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,

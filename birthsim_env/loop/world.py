@@ -1,6 +1,7 @@
 """Stages of the world: the plant with its clock, and what jumps."""
 
 from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, scratch
 from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -96,6 +97,13 @@ class Start(Rows):
     place = rows("x y", "m", "that place, of the end effector")
 
 
+class Joints(Rows):
+    """How the pistons move."""
+
+    position = rows("y1 y2", "m", "of the pistons")
+    velocity = rows("v1 v2", "m/s", "of the pistons")
+
+
 class Described(Numbers):
     """The rig as described, by whose geometry the pistons are put."""
 
@@ -105,16 +113,16 @@ class Described(Numbers):
 @helper
 def _settle(world: World, seen: Seen, own: Start, about: Described, n: int) -> None:
     """Put the pistons on the target, or where they are to start, the chambers in balance."""
-    motion, joints, asked = scratch(4), scratch(4), seen.reference
+    motion, joints, asked = Point(scratch(Point.size)), Joints(scratch(Joints.size)), seen.reference
     for i in range(n):
         elsewhere = own.elsewhere[i] > 0.0
         for axis in range(2):
-            motion[axis, i] = own.place[axis, i] if elsewhere else asked.position[axis, i]
-            motion[2 + axis, i] = 0.0 if elsewhere else asked.velocity[axis, i]
-    piston_motion(motion, about.rig, joints, n)
+            motion.position[axis, i] = own.place[axis, i] if elsewhere else asked.position[axis, i]
+            motion.velocity[axis, i] = 0.0 if elsewhere else asked.velocity[axis, i]
+    piston_motion(motion.rows, about.rig, joints.rows, n)
     for i in range(n):
-        world.state[Y1, i], world.state[Y2, i] = joints[0, i], joints[1, i]
-        world.state[V1, i], world.state[V2, i] = joints[2, i], joints[3, i]
+        world.state[Y1, i], world.state[Y2, i] = joints.position[0, i], joints.position[1, i]
+        world.state[V1, i], world.state[V2, i] = joints.velocity[0, i], joints.velocity[1, i]
     balance(world.state[:, :n], asked.pneumatic_stiffness, world.rig[:, :n])
     end_effector_motion(world.state[:, :n], world.rig[:, :n], world.motion.rows[:, :n])
 

@@ -20,6 +20,7 @@ from studies.tables import cells, markdown
 RIGS = {
     "acceleration, no force": ("admittance-sensorless", "examples/acceleration_sensor_rig.toml"),
     "neither": ("admittance-sensorless", None),
+    "neither, friction identified": ("admittance[force_sensor=false,identified=true]", None),
     "force": ("admittance-adaptive", None),
 }
 """Sensors besides positions and pressures -> the controller that makes the best of them, and its rig."""

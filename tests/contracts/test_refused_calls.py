@@ -1,6 +1,5 @@
 """Calls that are refused in one line beyond single values: shapes, what goes with what, what nothing can serve."""
 
-
 import gymnasium
 import numpy as np
 import pytest

@@ -130,14 +130,6 @@ def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
     np.testing.assert_array_equal(again[:, :-1], drawn[:, 1:])
 
 
-def test_a_nominal_rig_has_nominal_sensors_whose_errors_differ_by_episode():
-    env = gymnasium.make_vec(CIRCLE, num_envs=4, sensors="honest", randomize="scenario")
-    env.reset(seed=5)
-    errors = env.unwrapped.simulation.sensors._errors
-    np.testing.assert_array_equal(errors[: len(FIGURES)], np.broadcast_to(errors[: len(FIGURES), :1], (len(FIGURES), 4)))
-    assert len(np.unique(errors[len(FIGURES)])) == 4
-
-
 def test_drawn_sensors_meet_the_nominal_rig_and_have_the_errors_of_rigs_and_sensors_drawn():
     envs = {
         what: gymnasium.make_vec(CIRCLE, num_envs=4, sensors="honest", randomize=what) for what in ("sensors", "scenario", True)

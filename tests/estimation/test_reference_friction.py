@@ -110,21 +110,6 @@ def test_steady_motion_feels_the_stribeck_curve_whatever_the_step(period: float,
         assert np.abs(got[:, 1]).max() <= level * (1 + 1e-12), "never more"
 
 
-def test_a_resting_reference_keeps_its_bristles() -> None:
-    """What friction holds where the reference has stopped does not fade; at the start there is none."""
-    times = 1e-3 * np.arange(2000)
-
-    def stopping(at: Array) -> Array:
-        motion = circle(np.minimum(at, 0.4))
-        motion[2:4] *= at < 0.4
-        return motion
-
-    got = drags(RIG, times, stopping)
-    assert np.all(got[401:] == got[401])
-    assert np.abs(got[401]).min() > 5
-    assert np.all(drags(RIG, times[:50], lambda at: circle(0 * at) * [[1], [1], [0], [0]]) == 0)
-
-
 def two_lanes(times: Array) -> Array:
     """(T, 4, 2): the ellipse twice, with different pistons turning round at different times."""
     return np.stack([circle(times).T, circle(times + 0.9).T], axis=2)

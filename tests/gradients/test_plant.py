@@ -83,8 +83,6 @@ def test_reverse_is_forward_mode() -> None:
     np.testing.assert_allclose(few.state, back.state, rtol=1e-12, atol=1e-12 * np.abs(back.state).max())
 
 
-
-
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads the processor's instructions")
 @pytest.mark.slow
 def test_the_adjoint_runs_on_vectors() -> None:

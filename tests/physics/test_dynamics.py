@@ -35,6 +35,12 @@ def shown(rig: Parameters, plant: Plant, state: Array) -> Array:
     return np.stack([SecondModel(rig, observed[:, i], state[:, i]).state for i in range(plant.num_envs)], axis=1)
 
 
+def other_rates(rig: Parameters, plant: Plant, state: Array, command: Array, push: Array) -> Array:
+    """What the second model has for a state (18, N), command and push, (18, N)."""
+    columns = [np.ascontiguousarray(rows.T) for rows in (shown(rig, plant, state), command, push)]
+    return np.stack([second_model.rates(*one, *second_model.constants(rig)) for one in zip(*columns, strict=True)], axis=1)
+
+
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("changes", [MOVED, OTHER, DEMANDING], ids=["moved", "other", "demanding"])
 def test_rates_are_the_second_models(changes: dict[str, object], law: str) -> None:
@@ -45,9 +51,7 @@ def test_rates_are_the_second_models(changes: dict[str, object], law: str) -> No
     rates = plant.derivatives(state, command, push)
     step = 1e-6
     slope = (shown(rig, plant, state + step * rates) - shown(rig, plant, state - step * rates)) / (2 * step)
-    other, constants = shown(rig, plant, state), second_model.constants(rig)
-    columns = [np.ascontiguousarray(rows.T) for rows in (other, command, push)]
-    expected = np.stack([second_model.rates(*(rows[i] for rows in columns), *constants) for i in range(8)], axis=1)
+    expected = other_rates(rig, plant, state, command, push)
     # The relaxation limit of fast bristles is the plant's own; ``friction`` has its tests.
     fast = np.abs(state[[at.V1, at.V2]]) > 0.5
     assert not np.all(fast)
@@ -64,9 +68,7 @@ def test_flows_are_those_that_change_the_air() -> None:
     """The ledger of masses: inflow less outflow of each chamber is the second model's rate of its mass."""
     rig = Parameters().replace(MOVED)
     plant, command, push = anywhere(rig, 6, 3)
-    other, constants = shown(rig, plant, plant.state.copy()), second_model.constants(rig)
-    columns = [np.ascontiguousarray(rows.T) for rows in (other, command, push)]
-    expected = np.stack([second_model.rates(*(rows[i] for rows in columns), *constants) for i in range(6)], axis=1)
+    expected = other_rates(rig, plant, plant.state.copy(), command, push)
     flows = np.full((8, 6), np.nan)  # a fresh array may hold the flows of a call before
     dynamics.mass_flows(plant.state, plant.lane_parameters, flows)
     np.testing.assert_allclose(flows[:4] - flows[4:], expected[4:8], rtol=1e-9, atol=1e-15)

@@ -4,14 +4,12 @@ import gymnasium
 import numpy as np
 import pytest
 
-import agents
 from agents.residual.law import observation_names
 from agents.residual.settings import FORCE_LAWS, LAWS, NO_LAW, ResidualSettings
 from baselines.registry import SHORT_NAMES
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensors import SENSORS
 
-assert agents  # importing it registers the ids
 CIRCLE, LANES, STEPS = "BirthSIM/CircleResidual-v1", 3, 140
 BLIND = [law for law in LAWS if law not in FORCE_LAWS]
 

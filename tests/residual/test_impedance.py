@@ -7,7 +7,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-import agents
 from agents.residual.law import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, ResidualLaw, stiffen
 from agents.residual.settings import ResidualSettings
 from baselines.registry import make_controller
@@ -18,7 +17,6 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from tests.oracles import closed_loop
 
-assert agents  # importing it registers the ids
 PROBE, CIRCLE = "BirthSIM/ProbeResidual-v2", "BirthSIM/CircleResidual-v1"
 
 

@@ -4,12 +4,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-import agents
 from agents.residual.insight import SCALES, Insight
 from birthsim_env.loop.signals import Reference
 from birthsim_env.observation import LIMIT
 
-assert agents  # importing it registers the ids
 CIRCLE, LANES, PERIOD = "BirthSIM/CircleResidual-v1", 3, 1e-3
 
 

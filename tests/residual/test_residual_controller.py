@@ -4,7 +4,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-import agents
 from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, load_policy, save_policy
 from agents.policy.network import PolicyNetwork
@@ -15,7 +14,6 @@ from birthsim_env import Parameters
 from birthsim_env.observation import SIZE
 from tests.residual.policies import policy
 
-assert agents  # importing it registers the ids
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 
 

@@ -4,7 +4,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-import birthsim_env
 from agents.residual import authority
 from agents.residual.env import ResidualEnv, ResidualVectorEnv
 from agents.residual.law import ResidualActuation, ResidualLaw
@@ -17,7 +16,6 @@ from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
 from tests.oracles.residual_parts import UnexplainedForceObserver
 
-assert birthsim_env  # importing it registers the ids
 IDS = tuple(environment_id(name, "Residual") for name in SCENARIOS)
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 RIG = Parameters()

@@ -82,19 +82,14 @@ def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tm
     assert len(networks) == 5
 
 
-@pytest.fixture
-def events(trained):
-    """What TensorBoard shows of the small training: tag -> {step: value}."""
+def test_events_are_there_for_tensorboard_each_at_its_own_step(trained):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    (run,) = (trained[0] / "tensorboard").iterdir()
+    folder, reached = trained
+    (run,) = (folder / "tensorboard").iterdir()
     accumulator = EventAccumulator(str(run))
     accumulator.Reload()
-    return {tag: {event.step: event.value for event in accumulator.Scalars(tag)} for tag in accumulator.Tags()["scalars"]}
-
-
-def test_events_are_there_for_tensorboard_each_at_its_own_step(trained, events):
-    _, reached = trained
+    events = {tag: {one.step: one.value for one in accumulator.Scalars(tag)} for tag in accumulator.Tags()["scalars"]}
     assert {"rollout/ep_rew_mean", "train/value_loss", "validation/pooled_mm", "validation/tail_mm_law"} <= set(events)
     shown = list(events["validation/pooled_mm"].values())
     np.testing.assert_allclose(shown[:2], [point["pooled_mm"] for point in reached["curve"][:2]], rtol=1e-5)

@@ -6,12 +6,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-import agents
 from agents.training import validation
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from tests.training.brief import zero
 
-assert agents  # importing it registers the ids
 PROBE = "BirthSIM/ProbeResidual-v2"
 
 

@@ -12,7 +12,7 @@ from birthsim_env.parts.references import TURNED
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, row
+from birthsim_env.physics.compiled.records import Numbers, Rows, row, rows
 from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
 
 
@@ -27,8 +27,11 @@ class Contraction(Rows):
 class Heading(Numbers):
     """Where the force points."""
 
-    x = number("1", "cosine")
-    y = number("1", "sine")
+    along = rows("x y", "1", "cosine and sine")
+
+
+SWELL = 0
+"""Row of the contraction itself among the waves."""
 
 
 @helper
@@ -38,7 +41,7 @@ def _size(own: Array, waves: Array, knot: int, i: int) -> float:
     if k == own.shape[0]:
         return 0.0
     one = Contraction(own[k])
-    swell, wave, part = waves[0, place], waves[int(one.wave[i]), place], one.push[i]
+    swell, wave, part = waves[SWELL, place], waves[int(one.wave[i]), place], one.push[i]
     size: float = one.amplitude[i] * ((1.0 - part) * swell * swell + part * wave * wave)
     return size
 
@@ -49,12 +52,13 @@ def _contract(time: Array, own: Array, waves: Array, times: Array, heading: Head
     of each; ``times`` (K M + 1,) of all knots, between which the force is linear."""
     for i in range(n):
         low = knot_before(times[:, None], 0, times.shape[0], time[i])
-        span = times[low + 1] - times[low]
+        high = low + 1
+        span = times[high] - times[low]
         part = max(0.0, min(1.0, (time[i] - times[low]) / span)) if span > 0.0 else 1.0
-        before, after = _size(own, waves, low, i), _size(own, waves, low + 1, i)
-        x, y = before * heading.x, before * heading.y
-        force[0, i] = x + part * (after * heading.x - x)
-        force[1, i] = y + part * (after * heading.y - y)
+        before, after = _size(own, waves, low, i), _size(own, waves, high, i)
+        for axis in range(2):
+            first = before * heading.along[axis]
+            force[axis, i] = first + part * (after * heading.along[axis] - first)
 
 
 @kernel
@@ -100,7 +104,7 @@ class Contractions(UserForce):
         self._waves: Array = np.array([exact.direction(one)[1] for one in turns])
         begins = self.lasts * np.arange(self.count)
         self._times: Array = np.concatenate([*(one + time for one in begins), [self.count * self.lasts]])
-        self._heading = Heading.numbers(**dict(zip("xy", exact.direction(self.heading), strict=True)))
+        self._heading = Heading.numbers(along=exact.direction(self.heading))
         self._own: Array = np.zeros((self.count, Contraction.size, num_envs))
 
     @vectorised

@@ -114,7 +114,8 @@ def _interpolate(world: World, seen: Seen, memory: int, constants: int, tables: 
     for i in range(n):
         count = int(counts[i])
         low = knot_before(knots[:, 0], i, count, time[i])
-        before, after = Knot(knots[low]), Knot(knots[min(low + 1, count - 1)])
+        high = min(low + 1, count - 1)
+        before, after = Knot(knots[low]), Knot(knots[high])
         span = after.time[i] - before.time[i]
         part = max(0.0, min(1.0, (time[i] - before.time[i]) / span)) if span > 0.0 else 1.0
         for axis in range(2):
