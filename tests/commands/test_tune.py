@@ -156,7 +156,7 @@ def test_trials_of_another_search_are_not_mixed_in(own, tmp_path, trial_costs, m
     assert len(tried) == 6 + 3, "the start is the same for every seed"
     assert run("--trials", 3) == 0
     assert len(tried) == 9
-    Path(own.removesuffix(":Own")).write_text(OWN + "\n")
+    Path(own.removesuffix(":Own")).write_text(OWN + TUNED + "\n")
     assert run("--trials", 3) == 0
     assert tried[9:] == first, "a controller's file that changed is another controller"
 
