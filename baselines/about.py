@@ -22,3 +22,10 @@ CONTROLLERS = {
     "random-valves": "Valves open at random.",
 }
 """Name -> what it is."""
+
+
+def uses_force(controller: str) -> bool:
+    """Whether a controller, by name, is told the hand's force."""
+    without = ("sensor=false", "sensorless", "student")
+    own = controller.removeprefix("limited:").startswith("backstepping") or controller.endswith("-valves")
+    return not own and not any(one in controller for one in without)

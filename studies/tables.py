@@ -5,6 +5,7 @@ from collections.abc import Container, Hashable, Sequence
 
 import numpy as np
 
+from baselines.about import uses_force as uses_force
 from baselines.bench.statistics import number
 
 
@@ -34,11 +35,6 @@ def _mark(cells: list[list[str]], column: int, rows: list[int], most: bool) -> N
     if np.isfinite(best) and not (values == best).all():
         for row in np.array(rows)[values == best]:
             cells[row][column] = re.sub(r"^\S*[^\s,;]", r"**\g<0>**", cells[row][column])
-
-
-def uses_force(controller: str) -> bool:
-    """Whether a controller of the tables is told the hand's force."""
-    return not (controller.startswith("backstepping") or "sensorless" in controller or "student" in controller)
 
 
 def cells(values: Sequence[float | str]) -> str:

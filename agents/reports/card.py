@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from agents.policy.files import load_policy
-from agents.residual.settings import FORCE_LAWS, NO_LAW, is_one_of
+from agents.residual.settings import NO_LAW
+from baselines.about import uses_force
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import penalize_lost, quantile
 from baselines.registry import make_controller
@@ -38,7 +39,8 @@ FIGURES = {
 def compared(folder: Path) -> list[Evaluation]:
     """A policy, the law that it corrects, the paper's, the one without a force sensor where it has none, and the best one.
 
-    All meet the same worlds, of the kind that its training had."""
+    All meet the same worlds, of the kind that its training had. Raises ``ValueError`` where the training left no settings.
+    """
     policy = load_policy(folder)
     try:
         about = json.loads((folder / TRAINING).read_text(encoding="utf-8"))["settings"]
@@ -47,12 +49,13 @@ def compared(folder: Path) -> list[Evaluation]:
         problem = f"policy = {shown(str(folder))} says not what it was trained on ({error!r})"
         raise ValueError(f"{problem}; allowed: a folder with {TRAINING}, as birthsim train writes it") from error
     place = policy.environment.replace("Residual", "")
-    best = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], randomize)[BEST]["controller"]
+    best = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], bool(randomize))[BEST]["controller"]
     beside = [policy.settings.law, "backstepping", *["admittance-sensorless"] * (not policy.settings.force_sensor), best]
-    controllers = {"this policy": f"residual:{folder}", **{name: name for name in beside if name != NO_LAW}}
+    controllers = {"this policy": make_controller("residual", rig, policy=str(folder))}
+    controllers |= {name: make_controller(name, rig) for name in beside if name != NO_LAW}
     return [
-        evaluate(place, make_controller(name, rig), who, EPISODES, SEED, sensors=sensors, randomize=randomize, parameters=rig)
-        for who, name in controllers.items()
+        evaluate(place, controller, who, EPISODES, SEED, sensors=sensors, randomize=randomize, parameters=rig)
+        for who, controller in controllers.items()
     ]
 
 
@@ -67,7 +70,7 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
         "dataset": {"type": "gymnasium", "name": policy.environment},
         "metrics": [{"type": key, "name": FIGURES[key][0], "value": row[0]} for key, row in rows.items()],
     }
-    force = [policy.settings.force_sensor, *(_reads_force(who) for who in whom[1:])]
+    force = [policy.settings.force_sensor, *(uses_force(who) for who in whom[1:])]
     table = [
         f"| | {' | '.join(whom)} |",
         "|---|" + "---|" * len(whom),
@@ -98,7 +101,7 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
         "ask for more than the rig's strength. No training, validation or design had them.",
         "",
         *(f"- {_said(who, rows, k)}" for k, who in enumerate(whom) if k),
-        "- A small error renders no stiffness: `birthsim study haptics` measures what a hand feels.",
+        "- A small error does not say what a hand feels; in a clone, `birthsim study haptics` measures that.",
         "- It is a policy of a simulation. No real rig has run it, and it is no medical device.",
         "",
         f"      birthsim evaluate --controller {' '.join(whom[1:])} residual --policy FOLDER --sensors {about['sensors']}",
@@ -114,10 +117,6 @@ def figures(evaluation: Evaluation) -> dict[str, float]:
         sizes = np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost))[feasible]
         found[f"{metric} {statistic}"] = quantile(sizes, 0.95 if statistic == "q95" else 0.5)
     return found
-
-
-def _reads_force(controller: str) -> bool:
-    return is_one_of(controller, FORCE_LAWS) or not controller.startswith(("backstepping", "admittance"))
 
 
 def _said(who: str, rows: dict[str, list[float]], column: int) -> str:

@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from baselines.about import uses_force
 from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import SHORT_NAMES, controller_names, make_controller, resolved
 from birthsim_env import Parameters
@@ -88,3 +89,15 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
         assert one.function is other.function
         np.testing.assert_array_equal(one.constants, other.constants)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("backstepping-weight", False), ("shut-valves", False), ("admittance-sensorless", False),
+        ("admittance[force_sensor=false,identified=true]", False), ("residual:circle_honest_student", False),
+        ("residual:circle", True), ("limited:pid", True), ("limited:backstepping", False), ("admittance[learn=false]", True),
+    ],
+)  # fmt: skip
+def test_a_table_knows_who_is_told_the_force(name, told):
+    assert uses_force(name) == told
