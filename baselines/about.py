@@ -25,7 +25,7 @@ CONTROLLERS = {
 
 
 def uses_force(controller: str) -> bool:
-    """Whether a controller, by name, is told the hand's force."""
+    """Whether a controller, by name, is told the hand's force; the limiter of ``limited:`` needs it."""
     without = ("sensor=false", "sensorless", "student")
-    own = controller.removeprefix("limited:").startswith("backstepping") or controller.endswith("-valves")
-    return not own and not any(one in controller for one in without)
+    own = controller.startswith("backstepping") or controller.endswith("-valves")
+    return controller.startswith("limited:") or not (own or any(one in controller for one in without))

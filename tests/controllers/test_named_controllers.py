@@ -96,7 +96,7 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     [
         ("backstepping-weight", False), ("shut-valves", False), ("admittance-sensorless", False),
         ("admittance[force_sensor=false,identified=true]", False), ("residual:circle_honest_student", False),
-        ("residual:circle", True), ("limited:pid", True), ("limited:backstepping", False), ("admittance[learn=false]", True),
+        ("residual:circle", True), ("limited:pid", True), ("limited:backstepping", True), ("admittance[learn=false]", True),
     ],
 )  # fmt: skip
 def test_a_table_knows_who_is_told_the_force(name, told):
