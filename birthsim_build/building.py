@@ -72,10 +72,10 @@ def build_cortex(bundle: Bundle, folder: Path) -> Report:
     return {"target": "cortex-m7", **built, "stack": stack, "estimate": estimates(bundle)}
 
 
-def build_threads(loops: Sequence[Loop], rig: Parameters, seed: int, gpu: str | None, folder: Path) -> Report:
+def build_threads(loops: Sequence[Loop], rig: Parameters, gpu: str | None, folder: Path) -> Report:
     """Write kernels, PTX or for one ``gpu`` a cubin, and the program of each loop; returns sizes in bytes, and what a thread
     takes where that is known."""
-    functions, space, data = write_programs(loops, rig, seed, folder)
+    functions, space, data = write_programs(loops, rig, folder)
     write_kernels(folder)
     compile_object(functions, "ptx", folder / "birthsim.o", threads=Threads(space))
     ptx = folder / "birthsim.ptx"

@@ -9,12 +9,12 @@ The code of both is made by one call, for a processor, PTX or WebAssembly alike,
     program = program_of(pieces, like, pieces.functions, recorder.loop)
     write_wasm(pieces.functions, out, program.threads)     # or compile_object(pieces.functions, target, out, threads=...)
 
-It has ``birthsim_place``, ``_fill``, ``_advance`` and ``_backward``, which are called with thread, block, threads a block, the
+It has ``birthsim_place``, ``_begin``, ``_advance`` and ``_backward``, which are called with thread, block, threads a block, the
 address of a copy of ``program.words``, and two numbers (``tests/build/way_back.mjs`` does it in WebAssembly):
 
 1. ``place`` by one thread: the address of the data (``program.rows``, lanes), and how many lanes there are.
-2. ``fill``: 0, 0; all lanes begin as the first of ``pieces`` does. Or write into the data what each array begins with:
-   ``program.regions`` says where ``pieces.arrays()`` are, the action among them.
+2. Write into the data what each array begins with: ``program.regions`` says where ``pieces.arrays()`` are, the action among
+   them. Or ``begin`` (``threads.begin``): lanes begin as the first of ``pieces`` does, drawn where ``pieces`` begin episodes.
 3. ``advance``: control periods of a policy step, and the address of a tape (``program.tape(periods)``, lanes), or 0 for none.
 4. Write gradients into the bars of the tape: row ``PARAMETERS + recorder.at["reward"]``, or another name or ``carried`` of it;
    those of all other of the ``len(recorder.loop.live)`` rows are zero.

@@ -58,6 +58,7 @@ def place(program: int, lane: int, data: int, lanes: int) -> int:
 
 @helper
 def _fill(program: int, lane: int) -> None:
+    """What an episode does not draw is as the program says."""
     head = words(program, HEAD)
     lanes, first = head[LANES], HEAD + MOVE * head[MOVES] + STAGE * head[STAGES]
     for k in range(head[FILLS]):
@@ -67,14 +68,6 @@ def _fill(program: int, lane: int) -> None:
         for j in range(before):
             for i in range(behind):
                 array[j, lane, i] = begun[j, i]
-
-
-@kernel
-def fill(program: int, lane: int, unused: int, also_unused: int) -> int:
-    """A lane begins as the program says."""
-    if lane < words(program, HEAD)[LANES]:
-        _fill(program, lane)
-    return 0
 
 
 @kernel
@@ -135,27 +128,25 @@ def advance(program: int, lane: int, periods: int, tape: int, space: int, dispat
     return missed
 
 
-RUNS = ("place", "fill", "advance")
+PLACE, BEGIN, ADVANCE = RUNS = ("place", "begin", "advance")
 """What a device is asked to run, each with the address of a program and two whole numbers."""
 
-BEGIN, BACK = "begin", "backward"
-"""What it is asked to run besides where there are stages that begin episodes, and where there are adjoints
-(``code.adjoints.backward``)."""
+BACK = "backward"
+"""What it is asked to run besides where there are adjoints (``code.adjoints.backward``)."""
 
 
 class Threads(NamedTuple):
     """What code needs besides stages where threads run lanes: rows of a lane's memory; for the way back, functions of adjoints
-    (``module:name``) and the rows that they need; whether episodes begin there."""
+    (``module:name``) and the rows that they need."""
 
     space: int
     adjoints: Sequence[str] = ()
     back_space: int = 0
-    begins: bool = False
 
     @property
     def runs(self) -> tuple[str, ...]:
         """Names of what a device is asked to run."""
-        return (*RUNS, *((BEGIN,) if self.begins else ()), *((BACK,) if self.adjoints else ()))
+        return (*RUNS, *((BACK,) if self.adjoints else ()))
 
 
 def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str], device: bool) -> str:
@@ -165,13 +156,13 @@ def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str
     kernels, which know their thread; elsewhere functions that are told it: thread, block, threads a block.
     """
     wrappers = "\n".join(wrapper(k, symbol, "i64 %lane") for k, symbol in enumerate(symbols))
-    stages, own = len(symbols) - len(threads.adjoints), (RUNS[-1], threads.space)
-    rooms = {RUNS[-1]: own, BEGIN: own, BACK: (BACK, threads.back_space)}
+    stages, own = len(symbols) - len(threads.adjoints), (ADVANCE, threads.space)
+    rooms = {BEGIN: own, ADVANCE: own, BACK: (BACK, threads.back_space)}
     pairs = zip(threads.runs, kernels, strict=True)
     entries = "".join(_entry(name, symbol, *rooms.get(name, ("", 0))) for name, symbol in pairs)
     return f"""
 {wrappers}
-{_dispatch(RUNS[-1], range(stages))}
+{_dispatch(ADVANCE, range(stages))}
 {_dispatch(BACK, range(stages, len(symbols)))}
 {entries}
 {_kernels(threads.runs) if device else _functions(threads.runs)}"""

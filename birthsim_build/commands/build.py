@@ -51,8 +51,8 @@ class Settings(Configured):
     gpu: str | None = None
     """Architecture of a cubin, as sm_90; else sm_80. PTX runs on any from there on."""
     parameters: RigFile = None
-    seed: Seed = 0
-    """Of the episode that begins."""
+    seed: Seed | None = None
+    """Of the episode that begins, else 0; kernels are told it where they run."""
     out: Path
     """Folder for the files and build.json."""
 
@@ -63,11 +63,13 @@ def main(settings: Settings) -> None:
     threads = target in ("ptx", "cubin")
     if settings.gpu and target != "cubin":
         raise ValueError(f"--gpu with {target}; allowed: with cubin")
+    if threads and settings.seed is not None:
+        raise ValueError(f"--seed with {target}; allowed: with other targets, kernels are told it where they run")
     rig = load_parameters(settings.parameters)
     scenarios, sensors, controllers, policies = _chosen(settings)
     bundle = None
     if not threads:
-        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, target == "cortex-m7")
+        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed or 0, target == "cortex-m7")
     require_llvm()
     if target == "cubin":
         require_assembler()
@@ -78,7 +80,7 @@ def main(settings: Settings) -> None:
         if bundle is None:
             laws = [*controllers, *(f"{RESIDUAL}:{name}" for name in policies)]
             gpu = (settings.gpu or OLDEST) if target == "cubin" else None
-            report = build_threads(list(product(scenarios, sensors, laws)), rig, settings.seed, gpu, place)
+            report = build_threads(list(product(scenarios, sensors, laws)), rig, gpu, place)
         elif target == "wasm":
             report = build_wasm(bundle, place)
         elif target == "cortex-m7":

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from birthsim_build.bundle import identifier
-from birthsim_build.device.loops import SEVERAL, controlled, pieces_of
+from birthsim_build.device.beginning import beginning_with
+from birthsim_build.device.loops import SEVERAL, controlled
 from birthsim_build.device.program import Pieces, Program, key_of, program_of
 from birthsim_build.layout import LAYOUT
 from birthsim_env.episodes import Episodes
@@ -15,18 +16,18 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 
 def write_programs(
-    loops: Iterable[tuple[str, str, str]], rig: Parameters, seed: int, folder: Path
+    loops: Iterable[tuple[str, str, str]], rig: Parameters, folder: Path
 ) -> tuple[list[str], int, dict[str, int]]:
     """Write ``NAME.bin`` and ``NAME.json`` of loops (scenario, sensors, controller) into ``folder``.
 
-    Returns the functions that the code must have, rows of a thread's memory, and bytes of data of a lane by name. Lanes begin
-    where the episode seeded ``seed`` does. The words are those of ``program``; the JSON names rows of the data.
+    Returns the functions that the code must have, rows of a thread's memory, and bytes of data of a lane by name. A lane begins
+    any episode of any seed. The words are those of ``program``; the JSON names rows of the data.
     """
     made: dict[str, tuple[Episodes, Pieces, Pieces]] = {}
     for scenario, sensors, controller in loops:
-        many, other = (controlled(scenario, sensors, rig, controller, seed, lanes) for lanes in SEVERAL)
+        many, other = (controlled(scenario, sensors, rig, controller, 0, lanes) for lanes in SEVERAL)
         name = f"{scenario}_{sensors}_{identifier(controller)}"
-        made[name] = many, pieces_of(many.simulation), pieces_of(other.simulation)
+        made[name] = many, beginning_with(many), beginning_with(other)
     functions = sorted({function for _, pieces, _ in made.values() for function in pieces.functions})
     space, data = 0, {}
     for name, (episodes, pieces, like) in made.items():

@@ -221,5 +221,5 @@ def program_of(many: Pieces, other: Pieces, functions: Sequence[str], taped: Tap
     rows = sum(region.rows for region in regions.values())
     head = np.array([MAGIC, writer.size, 0, 0, rows, space, 0, *counts, way_back], dtype=np.int64)
     lists = [np.ravel(np.array(one, dtype=np.int64)) for one in (moved, staged, fills, writer.relocations)]
-    threads = Threads(space, adjoints, back, bool(many.beginning))
+    threads = Threads(space, adjoints, back)
     return Program(np.concatenate([head, *lists, *writer.pieces]), tuple(found), rows, threads, about)

@@ -5,12 +5,16 @@
  * rows of the data by name: row r of lane i is the double data[r * lanes + i].
  *
  *     birthsim_place   <<<1, 1>>>     (program, data, lanes);     once, and when either has moved
- *     birthsim_fill    <<<blocks, 32>>>(program, 0, 0);           all lanes begin as the program says
+ *     birthsim_begin   <<<blocks, 32>>>(program, starts, count);  episodes begin in count lanes
  *     birthsim_advance <<<blocks, 32>>>(program, periods, 0);     control periods, the last of which closes a policy step
  *
- * with 32 * blocks >= lanes. Reward, ends and info in the data are those of the last policy step; the fastest collisions, impact1
- * and impact2, are those since they were last set to zero. Word @MISSED@ of the program counts how often a law could not serve
- * what it was asked for. Nothing here allocates memory.
+ * with 32 * blocks >= count, or lanes. `starts` is the address of six rows of `count` 64-bit words: lanes; the seed of each; the
+ * number of its episode, each of which is drawn anew; and three doubles: 0, 0, 0 to begin on the target, or 1 and the place
+ * (x, y), m, where to begin. An episode is that of Python with the same seed, bit for bit.
+ *
+ * Reward, ends and info in the data are those of the last policy step; the fastest collisions, impact1 and impact2, are those
+ * since they were last set to zero. Word @MISSED@ of the program counts how often a law could not serve what it was asked for.
+ * Nothing here allocates memory.
  */
 #ifndef BIRTHSIM_KERNELS_H
 #define BIRTHSIM_KERNELS_H
@@ -18,7 +22,7 @@
 #include <stdint.h>
 
 void birthsim_place(int64_t *program, int64_t data, int64_t lanes);
-void birthsim_fill(int64_t *program, int64_t unused, int64_t unused_too);
+void birthsim_begin(int64_t *program, int64_t starts, int64_t count);
 void birthsim_advance(int64_t *program, int64_t periods, int64_t zero);
 
 #endif

@@ -17,6 +17,7 @@ from birthsim_build.device.machine import WIDTH, Host
 from birthsim_build.image import HEAD
 from birthsim_build.layout import LAYOUT, ROWS
 from birthsim_env.loop.rows import ASKED, WORLD
+from birthsim_env.loop.world import Start
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -85,8 +86,9 @@ def thread_rows(loops: Sequence[tuple[str, str, str]], rig: Parameters, folder: 
 
     They are those of the first lane of a second block of a graphics processor's threads, whose code this processor runs.
     """
-    functions, space, _ = write_programs(loops, rig, 0, folder)
+    functions, space, _ = write_programs(loops, rig, folder)
     run, lanes = Host().load(tuple(functions), Threads(space)), WIDTH + 1
+    starts = np.concatenate([[np.arange(lanes)], np.zeros((Start.size, lanes), dtype=np.int64)])
     for scenario, sensors, controller in loops:
         name = f"{scenario}_{sensors}_{identifier(controller)}"
         words, about = np.fromfile(folder / f"{name}.bin", dtype=np.int64), json.loads((folder / f"{name}.json").read_text())
@@ -94,7 +96,7 @@ def thread_rows(loops: Sequence[tuple[str, str, str]], rig: Parameters, folder: 
         own = [(ROW[row], at) for row, at in about["rows"].items() if row in ROW]
         numbers, places = map(list, zip(*own, strict=True))
         run("place", 1, words.ctypes.data, data.ctypes.data, lanes)
-        run("fill", lanes, words.ctypes.data, 0, 0)
+        run("begin", lanes, words.ctypes.data, starts.ctypes.data, lanes)
         for row in kept:
             run("advance", lanes, words.ctypes.data, 1, 0)
             row[numbers] = data[places, WIDTH]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from birthsim_build.code.compiler import compile_object
+from birthsim_build.code.threads import RUNS
 from birthsim_build.device.beginning import beginning_with
 from birthsim_build.device.program import program_of
 from birthsim_env import ForceProfile, Parameters
@@ -17,7 +18,7 @@ from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.references import Circle
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.build.targets import need_device, need_threads
+from tests.build.targets import assert_fusing_changes_nothing, need_device, need_threads
 from tests.build.test_device import assert_equal, assert_same_run
 from tests.build.test_threads import assert_exact
 
@@ -70,15 +71,16 @@ def test_many_and_one(lanes):
 @pytest.mark.slow
 def test_ptx_of_a_beginning_is_exact_and_alone(tmp_path):
     need_threads()
-    for k, case in enumerate(("circle honest", "options", "contractions", "noise")):
+    for case in ("circle honest", "options", "contractions", "noise"):
         scenario, arguments = CASES[case]
         many, other = (Episodes(assemble(lanes, scenario, **{"randomize": True, **arguments})) for lanes in (3, 2))
         pieces = beginning_with(many)
         program = program_of(pieces, beginning_with(other), pieces.functions)
-        compile_object(pieces.functions, "ptx", tmp_path / f"{k}.o", threads=program.threads)
-        text = (tmp_path / f"{k}.ptx").read_text()
+        compile_object(pieces.functions, "ptx", tmp_path / "code.o", threads=program.threads)
+        text = (tmp_path / "code.ptx").read_text()
         assert_exact(text)
-        assert re.findall(r"^\.visible \.entry birthsim_(\w+)", text, re.MULTILINE)[-2:] == ["advance", "begin"]
+        assert re.findall(r"^\.visible \.entry birthsim_(\w+)", text, re.MULTILINE) == list(RUNS)
+        assert_fusing_changes_nothing(tmp_path, "begin", 50_000)
 
 
 class Taps(ForceProfile):

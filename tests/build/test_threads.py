@@ -130,11 +130,11 @@ def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
     compile_object(sorted(functions | LOOKS), "ptx", tmp_path / "all.o", threads=threads.Threads(1024))
     text = (tmp_path / "all.ptx").read_text()
     assert_exact(text)
-    assert len(re.findall(r"^\.visible \.entry", text, re.MULTILINE)) == 3
+    assert len(re.findall(r"^\.visible \.entry", text, re.MULTILINE)) == len(threads.RUNS)
     assert ".visible .func" not in text
-    # A thread's 1,024 rows, and what stages keep beside them: predictive control needs most.
+    # 1,024 rows of a thread, to begin and to advance, and what stages keep beside them: predictive control needs most.
     frames = list(map(int, re.findall(r"\.local \.align \d+ \.b8\s+__local_depot\d+\[(\d+)\]", text)))
-    assert 8 * 1024 < sum(frames) < 24 * 1024
+    assert 16 * 1024 < sum(frames) < 32 * 1024
 
 
 @pytest.mark.slow
@@ -148,23 +148,30 @@ def test_fusing_is_given_no_chance(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_exported_program_runs_by_its_own_kernels(tmp_path):
-    functions, space, data = write_programs([("circle", "lab", "admittance-backstepping")], Parameters(), SEED, tmp_path)
+@pytest.mark.parametrize("position", [None, (0.51, 0.01)])
+def test_an_exported_program_runs_by_its_own_kernels(position, tmp_path):
+    functions, space, data = write_programs([("circle", "lab", "admittance-backstepping")], Parameters(), tmp_path)
     (name,) = data
     words, about = np.fromfile(tmp_path / f"{name}.bin", dtype=np.int64), json.loads((tmp_path / f"{name}.json").read_text())
     lanes, run = 33, Host().load(tuple(functions), threads.Threads(space))
-    rows = np.full((about["words_of_data"], lanes), -1.0)
-    for kernel, *numbers in (("place", rows.ctypes.data, lanes), ("fill", 0, 0), *[("advance", about["periods"], 0)] * 3):
+    rows, starts = np.full((about["words_of_data"], lanes), -1.0), np.zeros((6, lanes), dtype=np.int64)
+    starts[:3] = np.arange(lanes), SEED + np.arange(lanes) // 3, np.arange(lanes) % 3
+    if position:
+        starts[3:].view(np.float64)[...] = np.array([[1.0, *position]]).T
+    begins = "begin", starts.ctypes.data, lanes
+    for kernel, *numbers in (("place", rows.ctypes.data, lanes), begins, *[("advance", about["periods"], 0)] * 3):
         run(kernel, lanes, words.ctypes.data, *numbers)
     assert words[threads.MISSED] == 0
-    simulation = (episodes := begun(1, sensors="lab", controller="admittance-backstepping")).simulation
+    simulation = (episodes := begun(lanes, sensors="lab", controller="admittance-backstepping")).simulation
+    episodes.begin_first(starts[1].tolist(), starts[2], position and np.array(position))
     for _ in range(3):
         simulation.run(simulation.periods)
-    found = np.concatenate(simulation.rows())[:, 0]
+    found = np.concatenate(simulation.rows())
     expected = {row.name: found[row.number] for row in LAYOUT if row.number < len(found) and row.name in about["rows"]}
     for array, names in episodes.outcome_rows():
-        expected |= dict(zip(names, array[:, 0], strict=True))
+        expected |= dict(zip(names, array, strict=True))
     assert expected.keys() == about["rows"].keys()
     for name, row in about["rows"].items():
         np.testing.assert_array_equal(rows[row], expected[name], err_msg=name)
-    assert expected["time"] == 0.03
+    assert len(np.unique(expected["measured_x"])) == lanes
+    assert set(expected["time"]) == {0.03}
