@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from agents.policy.onnx_export import export_onnx
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
-    from agents.training.sb3_adapter import SB3VecEnv
-    from agents.training.shifted_reward import ShiftedReward
+    from agents.training.sb3.adapter import SB3VecEnv
+    from agents.training.sb3.shifted_reward import ShiftedReward
     from agents.training.trainer import train
 
 BELONGS_TO_BIRTHSIM = True
@@ -22,8 +22,8 @@ _PLACES = {
     "Policy": "policy.files",
     "ResidualController": "policy.controller",
     "ResidualSettings": "residual.settings",
-    "SB3VecEnv": "training.sb3_adapter",
-    "ShiftedReward": "training.shifted_reward",
+    "SB3VecEnv": "training.sb3.adapter",
+    "ShiftedReward": "training.sb3.shifted_reward",
     "TrainingSettings": "training.configuration",
     "export_onnx": "policy.onnx_export",
     "load_policy": "policy.files",

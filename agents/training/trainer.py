@@ -20,7 +20,7 @@ from agents.training.events import EVENTS, events_in
 from agents.training.margin import widened
 from agents.training.policy_gradient import PolicyGradient
 from agents.training.reached import Reached, described
-from agents.training.stable_baselines import StableBaselines
+from agents.training.sb3.learner import StableBaselines
 from birthsim_env.physics.rig.parameters import load_parameters
 
 

@@ -85,10 +85,11 @@ def _checkpoints(folder: Path) -> tuple[Any, Any, bytes]:
     import torch
     from stable_baselines3.common.vec_env import VecNormalize
 
-    from agents.training.algorithms import make_model
-    from agents.training.checkpoint import NAME, load_checkpoint, save_checkpoint
+    from agents.training.checkpoint import NAME
     from agents.training.configuration import TrainingSettings
-    from agents.training.sb3_adapter import SB3VecEnv
+    from agents.training.sb3.adapter import SB3VecEnv
+    from agents.training.sb3.algorithms import make_model
+    from agents.training.sb3.checkpoint import load_checkpoint, save_checkpoint
 
     torch.set_num_threads(1)
     tiny = TrainingSettings("BirthSIM/ProbeResidual-v2", steps=64, lanes=2, rollout=16, batch=32, hidden=(8, 8))
@@ -103,7 +104,8 @@ def _checkpoints(folder: Path) -> tuple[Any, Any, bytes]:
 
 
 def _checkpoint(valid: tuple[Any, Any, bytes], rng: Rng, folder: Path, case: Case) -> None:
-    from agents.training.checkpoint import FORMAT, NAME, load_checkpoint
+    from agents.training.checkpoint import FORMAT, NAME
+    from agents.training.sb3.checkpoint import load_checkpoint
 
     model, env, content = valid
     written(case, folder / NAME, _sealed(rng, content, FORMAT))

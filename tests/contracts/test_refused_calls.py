@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
-from agents.training.shifted_reward import ShiftedReward
+from agents.training.sb3.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
 from baselines.controller import checked_command
 from baselines.identification.experiment import propose

@@ -12,10 +12,11 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from agents.training.algorithms import make_model
-from agents.training.checkpoint import FORMAT, NAME, load_checkpoint, save_checkpoint
+from agents.training.checkpoint import FORMAT, NAME
 from agents.training.reached import described
-from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.sb3.adapter import SB3VecEnv
+from agents.training.sb3.algorithms import make_model
+from agents.training.sb3.checkpoint import load_checkpoint, save_checkpoint
 from agents.training.trainer import train
 from birthsim_env import Parameters
 from tests.residual.policies import Trap

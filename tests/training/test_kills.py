@@ -11,8 +11,10 @@ import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
-from agents.training import monitor, reached
-from agents.training.checkpoint import NAME, save_checkpoint
+from agents.training import reached
+from agents.training.checkpoint import NAME
+from agents.training.sb3 import monitor
+from agents.training.sb3.checkpoint import save_checkpoint
 from agents.training.trainer import train
 from tests.console import PATIENCE, ROOT, run, strict
 from tests.training.brief import TINY, steady

@@ -9,9 +9,9 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents.residual.privileged import FIGURES, true_figures
-from agents.training.privileged import Privileged
-from agents.training.sb3_adapter import SB3VecEnv
-from agents.training.shifted_reward import ShiftedReward
+from agents.training.sb3.adapter import SB3VecEnv
+from agents.training.sb3.privileged import Privileged
+from agents.training.sb3.shifted_reward import ShiftedReward
 
 PROBE, RESIDUAL = "BirthSIM/Probe-v2", "BirthSIM/CircleResidual-v1"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)

@@ -14,11 +14,12 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.privileged import FIGURES
 from agents.residual.settings import ResidualSettings
-from agents.training import monitor, validation
 from agents.training import reached as reached_module
 from agents.training import trainer as training
+from agents.training import validation
 from agents.training.configuration import TrainingSettings
 from agents.training.margin import widened
+from agents.training.sb3 import monitor
 from agents.training.trainer import train
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController

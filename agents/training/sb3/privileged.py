@@ -9,7 +9,7 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from agents.residual.privileged import FIGURES, true_figures, with_figures
-from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.sb3.adapter import SB3VecEnv
 
 
 class Privileged(VecEnvWrapper):

@@ -9,10 +9,10 @@ from typing import Any
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
-from agents.training.algorithms import network_of
-from agents.training.checkpoint import save_checkpoint
 from agents.training.reached import Reached
-from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.sb3.adapter import SB3VecEnv
+from agents.training.sb3.algorithms import network_of
+from agents.training.sb3.checkpoint import save_checkpoint
 from agents.training.time_split import split
 
 

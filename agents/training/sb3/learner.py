@@ -9,15 +9,15 @@ from typing import Any
 from stable_baselines3.common.vec_env import VecNormalize
 from tqdm import tqdm
 
-from agents.training.algorithms import make_model, unchecked_distributions
-from agents.training.checkpoint import load_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS
-from agents.training.monitor import Monitor
-from agents.training.privileged import Privileged
 from agents.training.reached import Reached
-from agents.training.sb3_adapter import SB3VecEnv
-from agents.training.shifted_reward import ShiftedReward
+from agents.training.sb3.adapter import SB3VecEnv
+from agents.training.sb3.algorithms import make_model, unchecked_distributions
+from agents.training.sb3.checkpoint import load_checkpoint
+from agents.training.sb3.monitor import Monitor
+from agents.training.sb3.privileged import Privileged
+from agents.training.sb3.shifted_reward import ShiftedReward
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
 
 
