@@ -190,6 +190,8 @@ lint-workflows: $(TOOLS)/.ready
 	$(TOOLS)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(TOOLS)/bin/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
 	$(TOOLS)/bin/zizmor --offline --quiet .github
+	$(TOOLS)/bin/hadolint Containerfile
+	$(TOOLS)/bin/python -c "import rattler_build as r; r.Stage0Recipe.from_file('conda/recipe.yaml').render(r.VariantConfig())"
 
 bench: $(READY)
 	$(BIN)/birthsim study speed --out $(OUT)/bench
