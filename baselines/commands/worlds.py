@@ -42,7 +42,8 @@ def with_options(names: Sequence[str], entries: Sequence[str]) -> list[str]:
             raise ValueError(f"--set {entry!r}; allowed: GAIN=VALUE")
         if not any(have is None or option in have for have in known.values()):
             listed = "; ".join(f"{name}: {', '.join(have or ()) or 'nothing'}" for name, have in known.items())
-            raise ValueError(f"--set {entry!r}; allowed for {listed}")
+            asked = near(option, {one for have in known.values() for one in have or ()})
+            raise ValueError(f"--set {entry!r}{asked}; allowed for {listed}")
     found = []
     for name, have in known.items():
         own = [entry for entry in entries if have is None or entry.partition("=")[0] in have]
