@@ -17,11 +17,10 @@ from birthsim_build.commands import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.description import exponents
-from birthsim_env import Parameters
+from birthsim_env import Parameters, Plant
 from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import load_parameters
 from tests.build.targets import build, imported, need_linker
 from tests.console import ROOT

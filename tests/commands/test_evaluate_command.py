@@ -6,8 +6,7 @@ from functools import partial
 
 import pytest
 
-from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.files import finite
 from studies.comparison import stiffness as studies

@@ -10,10 +10,8 @@ import pytest
 
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, override
-from baselines import AdmittanceController, BacksteppingController
-from baselines.bench.evaluation import evaluate
+from baselines import AdmittanceController, BacksteppingController, evaluate, make_controller
 from baselines.limiter.controller import PortLimiter
-from baselines.registry import make_controller
 from baselines.rivals.symbolic import symbolic_model
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
 from birthsim_env.env import BirthSIMEnv

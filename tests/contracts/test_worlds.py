@@ -2,7 +2,6 @@
 
 import multiprocessing
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -36,7 +35,7 @@ WORLDS = st.fixed_dictionaries(
 )
 
 
-def walked(world: dict[str, Any]) -> list[Any]:
+def walked(world):
     """What an environment returns under random actions, checked as it comes."""
     env = gymnasium.make_vec(environment_id(world["scenario"]), num_envs=world["num_envs"], **world["arguments"])
     observation, info = env.reset(seed=world["seed"])
@@ -53,7 +52,7 @@ def walked(world: dict[str, Any]) -> list[Any]:
     return returned
 
 
-def assert_same(one: list[Any], other: list[Any]) -> None:
+def assert_same(one, other):
     for here, there in zip(one, other, strict=True):
         np.testing.assert_array_equal(here, there)
 

@@ -19,7 +19,7 @@ CIRCLE, PROBE = IDS[0], IDS[1]
 FACES = tuple(itertools.product(("valve", "flow"), ("two_valves", "one_valve"), ("ideal", "lab")))
 
 
-def make(name=CIRCLE, **arguments) -> BirthSIMEnv:
+def make(name=CIRCLE, **arguments):
     env = gymnasium.make(name, **arguments).unwrapped
     assert isinstance(env, BirthSIMEnv)
     return env

@@ -1,14 +1,11 @@
 """Random policies through the environments at the corners of the documented parameter ranges: a million steps, or 100,000."""
 
-from collections.abc import Iterator
-
 import gymnasium
 import numpy as np
 import pytest
 
 import birthsim_env
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.physics.compiled.lanes import Array
 
 CIRCLE, FORCEPS, DYSTOCIA = "BirthSIM/Circle-v1", "BirthSIM/Forceps-v1", "BirthSIM/Dystocia-v1"
 SETUPS = [
@@ -18,13 +15,13 @@ SETUPS = [
 ]
 
 
-def corner(corner_seed: int, friction: str) -> birthsim_env.Parameters:
+def corner(corner_seed, friction):
     rng = np.random.default_rng(corner_seed)
     changes = {name: float(rng.choice(bounds)) for name, bounds in documented_ranges(birthsim_env.Parameters()).items()}
     return birthsim_env.Parameters().replace({**changes, "friction.law": friction})
 
 
-def random_actions(rng: np.random.Generator, steps: int, lanes: int, size: int) -> Iterator[Array]:
+def random_actions(rng, steps, lanes, size):
     """Per lane and 0.3 s one of: white noise, held openings, bang-bang noise, full openings held."""
     for step in range(steps):
         if step % 30 == 0:
@@ -35,7 +32,7 @@ def random_actions(rng: np.random.Generator, steps: int, lanes: int, size: int) 
 
 @pytest.mark.parametrize(("lanes", "steps"), [(64, 200), pytest.param(256, 500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", range(len(SETUPS)), ids=["-".join(setup) for setup in SETUPS])
-def test_random_policies_leave_only_finite_states(seed: int, lanes: int, steps: int) -> None:
+def test_random_policies_leave_only_finite_states(seed, lanes, steps):
     name, valves, friction = SETUPS[seed]
     env = gymnasium.make_vec(
         name, num_envs=lanes, parameters=corner(seed, friction), valves=valves, randomize="scenario", autoreset_mode="SameStep"

@@ -7,8 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.assembly import DEFAULTS, Arguments
 from birthsim_env.env import BirthSIMEnv

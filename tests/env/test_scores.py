@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 import birthsim_env
-from baselines.bench.evaluation import evaluate
+from baselines import evaluate, make_controller
 from baselines.bench.measures import DISCOUNTS
-from baselines.registry import make_controller
+from birthsim_env import Parameters, Reference
 from birthsim_env.loop.rows import World
-from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.reward import Tally, add
 from birthsim_env.scores import ROLES, normalized_score, reference_scores
 

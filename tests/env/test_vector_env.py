@@ -11,7 +11,7 @@ from birthsim_env.vector_env import BirthSIMVectorEnv
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
 
 
-def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
+def make(name=CIRCLE, lanes=3, **arguments):
     env = gymnasium.make_vec(name, num_envs=lanes, **{"autoreset_mode": "SameStep", **arguments})
     assert type(env) is BirthSIMVectorEnv
     return env

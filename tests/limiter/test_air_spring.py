@@ -5,7 +5,6 @@ import pytest
 
 from baselines.limiter.air_spring import MEMORY
 from birthsim_env import Parameters
-from birthsim_env.loop.signals import Measurement
 from studies.haptics.worlds import resting
 from studies.stability.rig_port import RigPort
 from tests.limiter.parts import AirSpring
@@ -24,7 +23,7 @@ class Passive:
     def reset(self, lanes=None):
         self.air = None
 
-    def command(self, measurement: Measurement, reference):
+    def command(self, measurement, reference):
         self.air = self.air or AirSpring(RIG, measurement.position.shape[1], 0.001 / MEMORY)
         openings = self.air.openings(measurement, reference)
         kicked = (measurement.time >= 0.5) & (measurement.time < 0.53)

@@ -9,8 +9,7 @@ import pytest
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import bare_name, known_options, make_controller
 from baselines.staged import CompiledDriving, Driving, driving
-from birthsim_env import Parameters
-from birthsim_env.loop.signals import Measurement
+from birthsim_env import Measurement, Parameters
 from studies.haptics.worlds import resting
 from studies.stability.maps import Cases, judge
 

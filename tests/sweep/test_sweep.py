@@ -10,8 +10,7 @@ import pytest
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
-from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from studies.results import read_result
 from studies.sweeps.plan import load_sweep
