@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -15,29 +16,18 @@ from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 CIRCLE = "BirthSIM/Circle-v1"
+single, vector = partial(gymnasium.make, CIRCLE), partial(gymnasium.make_vec, CIRCLE, num_envs=2)
+both = pytest.mark.parametrize("make", [single, vector], ids=["single", "vector"])
 
 
-def single(**arguments):
-    return gymnasium.make(CIRCLE, **arguments)
-
-
-def vector(**arguments):
-    return gymnasium.make_vec(CIRCLE, num_envs=2, **arguments)
-
-
-@pytest.mark.parametrize("make", [single, vector])
-def test_a_specification_has_the_steps_of_an_episode(make):
+@both
+def test_steps_of_an_episode_rig_and_time_step_are_attributes(make):
     assert make().unwrapped.spec.max_episode_steps == 1600
-    assert make(duration=2.0, policy_period=0.02).unwrapped.spec.max_episode_steps == 100
     assert make(max_episode_steps=7).spec.max_episode_steps == 7
-
-
-@pytest.mark.parametrize("make", [single, vector])
-@pytest.mark.parametrize("heavier", [{"mechanics": {"mass": 4.0}}, {"mechanics.mass": 4.0}], ids=str)
-def test_rig_and_time_step_are_attributes(make, heavier):
-    env = make(parameters=heavier, policy_period=0.02).unwrapped
-    assert env.dt == 0.02
-    assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
+    for heavier in ({"mechanics": {"mass": 4.0}}, {"mechanics.mass": 4.0}):
+        env = make(parameters=heavier, duration=2.0, policy_period=0.02).unwrapped
+        assert (env.spec.max_episode_steps, env.dt) == (100, 0.02)
+        assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
 
 
 def test_a_number_is_a_stiffness_of_both_axes_for_all_time():
@@ -48,7 +38,7 @@ def test_a_number_is_a_stiffness_of_both_axes_for_all_time():
         np.testing.assert_array_equal(env.step(np.zeros(4))[4]["stiffness_setpoint"], 1500.0)
 
 
-@pytest.mark.parametrize("make", [single, vector])
+@both
 def test_all_numbers_in_info_are_numpys(make):
     """`is_success` of a single environment is a bool: Gymnasium's own conversion to tensors knows no NumPy one."""
     env = make()
@@ -56,7 +46,7 @@ def test_all_numbers_in_info_are_numpys(make):
         assert all(isinstance(value, (np.generic, np.ndarray, bool)) for value in info.values()), info
 
 
-@pytest.mark.parametrize("make", [single, vector])
+@both
 def test_actions_beyond_one_are_clipped_by_choice(make):
     wrong, right = make(clip_actions=True), make()
     wrong.reset(seed=0), right.reset(seed=0)
@@ -118,9 +108,8 @@ def test_every_argument_that_is_shown_is_taken():
 
 def test_info_says_what_a_step_costs():
     """Against the state of the plant, its flows and the parameters, until open valves have driven a piston into its stop."""
-    env = vector(
-        policy_period=0.001, user_force=lambda time: (30.0, -40.0), randomize="plant", autoreset_mode="Disabled"
-    )  # fmt: skip
+    hand = {"user_force": lambda time: (30.0, -40.0)}
+    env = vector(policy_period=0.001, randomize="plant", autoreset_mode="Disabled", **hand)
     env.reset(seed=3)
     plant, used, deepest, largest, costs = env.unwrapped.simulation.plant, np.zeros(2), 0.0, 0.0, set()
     for _ in range(900):

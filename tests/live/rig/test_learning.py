@@ -1,7 +1,6 @@
 """What the page learns with computes the gradients of training in PyTorch, and the rig runs what was learned."""
 
 import base64
-import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -12,8 +11,6 @@ from agents import TrainingSettings, load_policy
 from agents.policy.seeds import best_policy
 from agents.training.lanes import Lanes
 from agents.training.validation import TRAINING_SEED
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.folder import PAGE, packed_page, write_page
 from birthsim_live.rig.learning import worlds
 from birthsim_live.rig.pack import LEARNED
 from tests.live.rig.worker import node, run
@@ -65,14 +62,6 @@ console.log(JSON.stringify(Array.from(network.weights)));
 """
 
 
-@pytest.fixture
-def page(tmp_path):
-    """What learning needs of the page."""
-    for name in ("learning", "rig"):
-        shutil.copytree(PAGE / name, tmp_path / name)
-    return tmp_path
-
-
 def numbers(text):
     return np.frombuffer(base64.b64decode(text))
 
@@ -116,9 +105,8 @@ def test_an_update_is_one_of_adam(page):
     np.testing.assert_allclose(found, weights.detach().numpy(), rtol=1e-9)
 
 
-def test_the_rig_runs_what_was_learned(tmp_path):
+def test_the_rig_runs_what_was_learned(page):
     """A policy that is shipped, taught to the controller that learns, has the bits of that policy's own controller."""
-    write_page(tmp_path / "page", packed_page(Parameters()))
     network = load_policy(best_policy(LEARNED.partition(":")[2])).network
     taught = {
         "widths": [network.inputs, *(len(bias) for _, bias in network.layers)],
@@ -130,13 +118,11 @@ def test_the_rig_runs_what_was_learned(tmp_path):
     def case(name, *taught):
         return [("set", {**world, "controller": name}), ("reset", None), *taught, ("advance", 200)]
 
-    own, learned, none = run(tmp_path / "page", case(LEARNED), case("learning", ("teach", taught)), case("learning"))
+    own, learned, none = run(page, case(LEARNED), case("learning", ("teach", taught)), case("learning"))
     assert np.array_equal(own[-1].row, learned[-1].row, equal_nan=True)
     assert not none[-1].of("openings").any()
     assert own[-1].of("openings").any()
 
 
-def test_a_rig_that_it_lost_begins_anew_when_more_is_known(tmp_path):
-    write_page(tmp_path / "page", packed_page(Parameters()))
-    found = node(tmp_path / "page", LOST)
-    assert found == [["too hot", None], ["too hot", "too hot"]]  # under another controller nobody helps
+def test_a_rig_that_it_lost_begins_anew_when_more_is_known(page):
+    assert node(page, LOST) == [["too hot", None], ["too hot", "too hot"]]  # under another controller nobody helps
