@@ -70,7 +70,6 @@ class Fails(Slam):
     def command(self, measurement, reference):
         raise RuntimeError("no law at all")
 """
-NARROW = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2)
 
 
 @pytest.fixture
@@ -90,7 +89,8 @@ def small_studies(monkeypatch):
 def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
-    arguments = (*NARROW, "--plant", "nominal", "randomised", "--controller", "backstepping", slam, "--jobs", 1, "--out", out)
+    world = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2, "--plant", "nominal", "randomised")
+    arguments = (*world, "--controller", "backstepping", slam, "--jobs", 1, "--out", out)
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments)
     assert status == 0, complained
     assert "Warning" not in complained
@@ -98,6 +98,7 @@ def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys
     assert "4/4 " in complained
     content = strict(out / "comparison.json")
     assert content["settings"]["controller"] == ["backstepping", slam]
+    assert "out" not in content["settings"], "results do not depend on where they are"
     cells = {(cell["controller"], cell["plant"]): cell for cell in figures_of(content)}
     assert set(cells) == {(name, plant) for name in ("backstepping", slam) for plant in ("nominal", "randomised")}
     law, lost = cells["backstepping", "nominal"], cells[slam, "nominal"]
@@ -136,46 +137,19 @@ def test_how_the_stiffness_feels_is_kept_and_drawn(tmp_path, monkeypatch, capsys
         assert f"{name}.png" in printed
 
 
-WAITING = """
-import os, pathlib, time
-
-class Waits(Slam):
-    '''Until there is a file "go" beside this one, or nobody to wait for.'''
-    def command(self, measurement, reference):
-        began_by = os.getppid()
-        while not pathlib.Path(__file__).with_name("go").exists() and os.getppid() == began_by:
-            time.sleep(0.01)
-        return super().command(measurement, reference)
-"""
-
-
-@pytest.mark.slow
-def test_the_comparison_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
-    """Two pieces side by side: one is complete at Ctrl-C, the other one waits for what comes only afterwards."""
-    own, out = tmp_path / "own.py", tmp_path / "out"
-    own.write_text(OWN + WAITING)
-    names = ("--controller", f"{own}:Slam", f"{own}:Waits")
-    line = (*NARROW[:-1], 1, "--jobs", 2, "--plant", "randomised", *names, "--out", out)
-    status, _ = interrupted("comparison", line, lambda: list(out.rglob("*.json")))
-    assert status == 130
-    assert len(list(out.rglob("*.json"))) == 1
-    (tmp_path / "go").touch()
-    status, printed, _ = call("comparison", monkeypatch, capsys, *line)
-    assert status == 0
-    assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
-    assert "out" not in strict(out / "comparison.json")["settings"], "results do not depend on where they are"
-
-
 @pytest.mark.usefixtures("brief")
 def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
+    """With drawn sensors, whose case is named in words of its own."""
     (tmp_path / "own.py").write_text(OWN + FAILING)
     fails = f"{tmp_path}/own.py:Fails"
-    arguments = (*NARROW, "--plant", "nominal", "--jobs", 1, "--controller", fails, "backstepping")
+    world = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--plant", "drawn-sensors")
+    arguments = (*world, "--jobs", 1, "--controller", fails, "backstepping")
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
     assert "| backstepping |" in printed
     assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
+    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     assert [cell["controller"] for cell in figures_of(strict(tmp_path / "out" / "comparison.json"))] == ["backstepping"]
 
 
@@ -188,11 +162,3 @@ def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     assert status == 130
     assert f"episodes: {len(kept)} of 1563 are complete and kept; the same command goes on" in printed
     assert [path for path in out.rglob("*") if path.is_file() and path not in (*kept, out / ".lock")] == [], "no half a file"
-
-
-def test_the_comparison_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
-    own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
-    case = ("--plant", "drawn-sensors", "--out", tmp_path / "out")
-    status, _, complained = call("comparison", monkeypatch, capsys, *own, *case)
-    assert status == 0, complained
-    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()
