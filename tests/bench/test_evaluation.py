@@ -168,17 +168,9 @@ def test_a_lost_episode_counts_as_infinitely_bad_though_its_own_figures_end_with
 
 
 def test_nothing_runs_on_once_every_lane_is_lost():
-    class Counting(Slam):
-        calls = 0
-
-        def command(self, measurement, reference):
-            self.calls += 1
-            return super().command(measurement, reference)
-
-    slam = Counting(lanes=(0, 1))
-    result = run(slam, episodes=2, duration=7.0)
+    result = run(spy := Spy(Slam(lanes=(0, 1))), episodes=2, duration=7.0)
     assert result.lost == [True, True]
-    assert 300 < slam.calls < 1000
+    assert 300 < spy.calls < 1000
     assert result.traces[0].shape == (700, 2, 2)
 
 
