@@ -24,12 +24,9 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     files = {f"error_over_time.{kind}" for kind in ("png", "svg")} | {f"evaluation.{kind}" for kind in ("csv", "json", "md")}
     assert {path.name for path in out.iterdir()} == files | {".lock", "pieces", "times.json"}
     table = (out / "evaluation.md").read_text()
-    assert table.splitlines()[0] in printed
     assert table.startswith("BirthSIM/Probe-v2, 3 episodes from seed 7, ideal sensors, --randomize all")
-    assert "| metric | unit | backstepping: median | 95 % | max | backstepping-weight: median | 95 % | max |" in table
-    assert "| lost episodes |  | 0 of 3 |  |  | 0 of 3 |  |  |" in table
+    assert table.splitlines()[0] in printed
     figures = (out / "evaluation.csv").read_text().splitlines()
-    assert figures[0] == "metric,unit,controller,value,q95,max"
     assert "lost episodes,of 3,backstepping-weight,0,," in figures
     content = strict(out / "evaluation.json")
     assert content["arguments"]["env"] == "BirthSIM/Probe-v2"
@@ -86,7 +83,7 @@ def small_studies(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys):
+def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
     world = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2, "--plant", "nominal", "randomised")
@@ -111,15 +108,6 @@ def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys
     for name in ("settled_error", "air_against_error"):
         assert_picture(out, name)
         assert f"{name}.png" in printed
-    # Once more: nothing is computed, and all is the same.
-    written = {path: path.stat().st_mtime_ns for path in out.rglob("*.json") if path.parent != out}
-    assert len(written) == 4
-    status, again, _ = call("comparison", monkeypatch, capsys, *arguments)
-    assert status == 0
-    assert "comparison: 4 of 4 are there with these settings, rig and code, and are kept" in again
-    assert {path: path.stat().st_mtime_ns for path in written} == written
-    assert (out / "comparison.md").read_text() == text
-    assert strict(out / "comparison.json")["figures"] == content["figures"]
 
 
 @pytest.mark.slow

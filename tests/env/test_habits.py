@@ -7,6 +7,8 @@ from functools import partial
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import wrappers
+from gymnasium.wrappers import vector as lanes
 
 from baselines import evaluate, make_controller
 from birthsim_env import Parameters
@@ -28,6 +30,28 @@ def test_steps_of_an_episode_rig_and_time_step_are_attributes(make):
         env = make(parameters=heavier, duration=2.0, policy_period=0.02).unwrapped
         assert (env.spec.max_episode_steps, env.dt) == (100, 0.02)
         assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
+
+
+PICTURES = {"render_mode": "rgb_array", "picture_size": (320, 240)}
+ENDING = {mode: partial(vector, duration=0.08, autoreset_mode=mode) for mode in ("NextStep", "SameStep")}
+WRAPPED = {
+    "a picture as observation": lambda: wrappers.AddRenderObservation(single(**PICTURES), render_only=True),
+    "pictures in a list": lambda: wrappers.RenderCollection(single(**PICTURES)),
+    **{f"information in a list, {mode}": lambda made=made: lanes.DictInfoToList(made()) for mode, made in ENDING.items()},
+    "flat": lambda: lanes.VectorizeTransformObservation(ENDING["NextStep"](), wrappers.FlattenObservation),
+}
+
+
+@pytest.mark.parametrize("wrapped", WRAPPED.values(), ids=WRAPPED)
+def test_wrappers_that_use_more_than_arrays_in_boxes(wrapped):
+    """Pictures, and the information of lanes that have ended; ``studies/clients`` has the others."""
+    env = wrapped()
+    env.reset(seed=0)
+    for _ in range(20):
+        observation, reward, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
+        assert np.shape(observation) == env.observation_space.shape
+        assert np.isfinite(reward).all()
+    env.close()
 
 
 def test_a_number_is_a_stiffness_of_both_axes_for_all_time():
