@@ -15,7 +15,7 @@ from studies.accuracy.motions import MOTIONS, strong
 
 
 @pytest.mark.parametrize(("method", "order"), accuracy.EVALUATIONS.items())
-def test_a_method_has_its_order_on_a_spool(method: str, order: int) -> None:
+def test_a_method_has_its_order_on_a_spool(method, order):
     """The spools alone are a linear lag, whose solution is known: a step multiplies the rest by a piece of its series."""
     plant = accuracy.start([Parameters()], (0.0, 0.0))
     command, push = np.full((4, 1), 0.5), np.zeros((2, 1))
@@ -24,7 +24,7 @@ def test_a_method_has_its_order_on_a_spool(method: str, order: int) -> None:
     np.testing.assert_allclose(plant.state[14:], 0.5 * (1 - series**4), rtol=1e-12)
 
 
-def test_the_plants_own_step_errs_far_less_than_a_tracker() -> None:
+def test_the_plants_own_step_errs_far_less_than_a_tracker():
     """Strong motion of the nominal and the quickest rig; a laboratory's position noise is 100 um."""
     rigs = list(accuracy.rigs_to_measure(Parameters(), 1, 0).values())[:2]
     course = accuracy.run_method(rigs, strong, accuracy.runge_kutta, dynamics.INTEGRATION_STEP)
@@ -36,7 +36,7 @@ def test_the_plants_own_step_errs_far_less_than_a_tracker() -> None:
 
 
 @pytest.fixture(scope="module")
-def found() -> dict:
+def found():
     """A small measurement, as JSON gives it back."""
     patch = pytest.MonkeyPatch()
     with patch.context() as short:
@@ -49,7 +49,7 @@ def found() -> dict:
     return json.loads(json.dumps(finite(measured), allow_nan=False))
 
 
-def test_a_measurement_says_everything(found: dict) -> None:
+def test_a_measurement_says_everything(found):
     assert found["rigs"] == ["nominal", "quick corner", "slow corner", "draw 1"]
     assert found["motions"]["strong"]["clear_of_stops"][2] is False, "the slow corner runs into its stop"
     for name in MOTIONS:
@@ -65,7 +65,7 @@ def test_a_measurement_says_everything(found: dict) -> None:
     assert observed[accuracy.SHIPPED][0] == pytest.approx(4, abs=0.25)
 
 
-def test_tables_show_the_plants_row_and_what_is_unstable(found: dict, tmp_path) -> None:
+def test_tables_show_the_plants_row_and_what_is_unstable(found, tmp_path):
     text = accuracy_tables.tables(found)
     assert 'Motion "strong", 3 of 4 rigs' in text
     assert text.count("**Runge-Kutta 4, the plant's**") == 2

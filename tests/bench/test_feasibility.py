@@ -7,7 +7,6 @@ import pytest
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, StiffnessSchedule, UserForce
-from birthsim_env.physics.compiled.lanes import Array
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
@@ -22,20 +21,20 @@ STIFF = StiffnessSchedule(closed_loop=(1e5,))
 class Steady(UserForce):
     """One constant force (2, N), N, per lane, fading in over half a second."""
 
-    def __init__(self, forces: Array) -> None:
+    def __init__(self, forces):
         self.forces = np.asarray(forces, dtype=float)
 
-    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+    def force(self, time, position, velocity):
         return np.clip(time / 0.5, 0, 1)[:, None, :] * self.forces
 
 
-def made(lanes: int = 1, **arguments):
+def made(lanes=1, **arguments):
     env = gymnasium.make_vec(PROBE, num_envs=lanes, **{"stiffness": STIFF, "user_force": ForceProfile(), **arguments})
     env.reset(seed=0)
     return env
 
 
-def strengths(rig: Parameters) -> Array:
+def strengths(rig):
     """Largest push and pull of the air, N, (2 cylinders, 2): full against empty chambers, the atmosphere on the rod."""
     air = rig.air
     most = []
@@ -48,19 +47,19 @@ def strengths(rig: Parameters) -> Array:
     return np.array(most)
 
 
-def columns_at(place: Array, rig: Parameters = RIG) -> Array:
+def columns_at(place, rig=RIG):
     """Velocity of the end effector at ``place`` (2,) per unit speed of each piston: (2 axes, 2 cylinders)."""
     r4, r2 = by_points.lengths(by_points.pose_from_point(place[:, None], rig.geometry))
     piston = np.array([r4 - rig.geometry.k1, r2 - rig.geometry.k2])
     return rigid_body.jacobians(piston, rig)[0]
 
 
-def fraction(needed: Array, rig: Parameters = RIG) -> float:
+def fraction(needed, rig=RIG):
     """The larger fraction of both cylinders for the forces ``needed`` (2,), N."""
     return float(max(max(n / push, -n / pull) for n, (push, pull) in zip(needed, strengths(rig), strict=True)))
 
 
-def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_its_force() -> None:
+def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_its_force():
     place, weight = np.array([0.5, 0.0]), np.array([0.0, RIG.mechanics.mass * 9.81])
     for angle in np.linspace(0, 2 * np.pi, 8, endpoint=False):
         sizes = np.linspace(0, 300, 13)
@@ -76,7 +75,7 @@ def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_i
         assert found[-1] > 1 > found[0]
 
 
-def test_moving_takes_inertia_and_friction() -> None:
+def test_moving_takes_inertia_and_friction():
     rig = RIG.replace({"cylinder2.viscous_friction": 60.0, "mechanics.mass": 4.0})
     env = made(1, reference=Circle(radius=0.06, period=2.0), parameters=rig, duration=2.0)
     centre, rate, most = np.array([0.5, 0.0]), 2 * np.pi / 2.0, 0.0
@@ -90,7 +89,7 @@ def test_moving_takes_inertia_and_friction() -> None:
     np.testing.assert_allclose(required_strength_ratio(env), most, rtol=1e-9)
 
 
-def test_a_compliant_target_out_of_reach_is_infinite_in_its_lane_alone() -> None:
+def test_a_compliant_target_out_of_reach_is_infinite_in_its_lane_alone():
     """At 500 N/m 200 N ask for 0.4 m."""
     soft = StiffnessSchedule(closed_loop=(500.0,))
     pushes = np.array([[10.0, 200.0, -10.0], [0.0, 0.0, 5.0]])
@@ -100,7 +99,7 @@ def test_a_compliant_target_out_of_reach_is_infinite_in_its_lane_alone() -> None
     np.testing.assert_array_equal(found[[0, 2]], alone)
 
 
-def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
+def test_below_one_a_strong_law_holds_and_above_it_none_can():
     """The hand's force, either way along both axes, is scaled to 0.9 and 1.12 of what the air can bear, and held for 2 s."""
     sizes, forces = np.linspace(20.0, 400.0, 200), []
     for unit in np.array([[[1.0], [0.0]], [[-1.0], [0.0]], [[0.0], [1.0]], [[0.0], [-1.0]]]):

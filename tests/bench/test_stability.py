@@ -1,7 +1,6 @@
 """Stability maps: what counts as stable, known corners of the maps, figures and the command."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from tests.console import OWN, call, strict
 RIG = Parameters()
 
 
-def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch):
     """0.2 mm peak to peak are 0.2 N of a hand of 1000 N/m and 6 N of one of 30,000 N/m; 0.6 mm are too much for any."""
     spans = iter(np.array([[2e-4, 2e-4, 2e-4, 6e-4, np.nan], [1e-4, 1e-4, 1e-4, 1e-4, 1e-4]]) for _ in range(2))
     monkeypatch.setattr(stability, "END", 0.01)
@@ -28,7 +27,7 @@ def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest
     assert verdict.lost.tolist() == [False, False, False, False, True]
 
 
-def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path, monkeypatch):
     """Valves that drive both pistons out: lost, null in JSON, and said in the picture."""
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)
@@ -47,7 +46,7 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pyte
     assert "lost: ran into a stop" in "".join(re.findall("<!-- (.*?) -->", (tmp_path / "stability_own.svg").read_text()))
 
 
-def test_how_far_all_is_stable() -> None:
+def test_how_far_all_is_stable():
     """Up to the first cell that is not, whatever comes behind it."""
     rows = [[True, True, True], [True, False, True], [False, True, True]]
     chart = {"x": {"values": [1.0, 2.0, 3.0]}, "variants": {"a": {"stable": rows}}}
@@ -55,7 +54,7 @@ def test_how_far_all_is_stable() -> None:
 
 
 @pytest.mark.slow
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(tmp_path, monkeypatch, capsys):
     """Files, strict JSON, and a table with the numbers of the maps."""
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)

@@ -7,11 +7,10 @@ import pytest
 
 from baselines.bench.pneumatic_range import pneumatic_range, pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult
-from birthsim_env import Parameters
+from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, joint_force
-from birthsim_env.physics.plant import Plant
 from studies.comparison import stiffness as studies
 from studies.comparison import stiffness_figures as study_figures
 from studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study

@@ -4,7 +4,9 @@ import pytest
 from filelock import FileLock
 
 from birthsim_build.code.targets import HOST
-from tests.build.targets import BUILT, build, need_linker
+from studies.targets.reference import PERIODS
+from studies.targets.running import node_rows
+from tests.build.targets import BUILT, build, need_linker, need_program
 
 
 def _once(tmp_path_factory, target, *options):
@@ -29,3 +31,10 @@ def library(tmp_path_factory):
     if HOST is None:
         pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")
     return _once(tmp_path_factory, HOST, *BUILT)
+
+
+@pytest.fixture
+def in_node(wasm, tmp_path):
+    """Rows of a built loop in JavaScript; ``make`` is a method of ``Bundle`` and its arguments."""
+    need_program("node", "nodejs")
+    return lambda name, *make, **options: node_rows(wasm, list(make), tmp_path, PERIODS, **options)[0]

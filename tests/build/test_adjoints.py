@@ -15,7 +15,7 @@ from birthsim_build.code.elf import undefined_in
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.machine import Host
-from birthsim_build.device.program import Pieces, Program, program_of
+from birthsim_build.device.program import Pieces, program_of
 from birthsim_env.gradients import Recorder
 from birthsim_env.physics.compiled.lanes import PARAMETERS
 from tests.build.targets import assert_fusing_changes_nothing, assert_same_bits, fill, need_linker, need_program, need_threads
@@ -37,11 +37,11 @@ class Made(NamedTuple):
     pieces: Pieces
     like: Pieces
 
-    def program(self) -> Program:
+    def program(self):
         return program_of(self.pieces, self.like, self.pieces.functions, self.recorder.loop)
 
 
-def made(lanes: int, **arguments: Any) -> Made:
+def made(lanes, **arguments):
     envs = [gymnasium.make_vec(num_envs=n, randomize=True, **arguments).unwrapped for n in (lanes, 3 if lanes == 2 else 2)]
     for env in envs:
         env.reset(seed=5)
@@ -51,12 +51,12 @@ def made(lanes: int, **arguments: Any) -> Made:
     return Made(one, recorder, pieces_of(one), pieces_of(other))
 
 
-def flat(tape: Any, lanes: int) -> Any:
+def flat(tape, lanes):
     """A tape of blocks as (rows, lanes)."""
     return tape.transpose(1, 0, 2).reshape(tape.shape[1], -1)[:, :lanes]
 
 
-def back_here(made: Made, bars: Any) -> Any:
+def back_here(made, bars):
     """What ``TapedLoop`` makes of bars over the last policy step."""
     (tape, periods, rig), found = made.recorder._last, bars.copy()
     made.recorder.loop.back(periods, tape, rig, found)
@@ -65,7 +65,7 @@ def back_here(made: Made, bars: Any) -> Any:
 
 @pytest.mark.parametrize("lanes", [1, 33, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", [pytest.param(name, marks=pytest.mark.slow if name != "openings" else ()) for name in CASES])
-def test_a_thread_goes_back_as_a_lane(case: str, lanes: int) -> None:
+def test_a_thread_goes_back_as_a_lane(case, lanes):
     need_threads()
     here = made(lanes, **CASES[case])
     simulation, loop, rng = here.simulation, here.recorder.loop, np.random.default_rng(0)
@@ -89,7 +89,7 @@ def test_a_thread_goes_back_as_a_lane(case: str, lanes: int) -> None:
 
 
 @pytest.mark.slow
-def test_webassembly_goes_back_with_the_same_bits(tmp_path: Path) -> None:
+def test_webassembly_goes_back_with_the_same_bits(tmp_path):
     need_linker()
     need_program("node", "nodejs")
     lanes, here = 3, made(3, **CASES["openings"])
@@ -115,7 +115,7 @@ def test_webassembly_goes_back_with_the_same_bits(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_the_way_back_is_exact_and_alone(tmp_path: Path, case: str) -> None:
+def test_the_way_back_is_exact_and_alone(tmp_path, case):
     need_threads()
     here = made(3, **CASES[case])
     threads, functions = here.program().threads, here.pieces.functions

@@ -10,12 +10,11 @@ from birthsim_build.code.compiler import compile_object
 from birthsim_build.code.threads import RUNS
 from birthsim_build.device.beginning import beginning_with
 from birthsim_build.device.program import program_of
-from birthsim_env import ForceProfile, Parameters
+from birthsim_env import Circle, ForceProfile, Parameters
 from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
 from birthsim_env.loop.loop import Loop
 from birthsim_env.parts.hands.contractions import Contractions
-from birthsim_env.parts.references import Circle
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
 from tests.build.targets import assert_fusing_changes_nothing, need_device, need_threads

@@ -13,7 +13,7 @@ from birthsim_build.loops import plant_world
 from birthsim_env import Parameters, Plant
 from studies.targets import reference
 from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
-from studies.targets.running import EMULATED, ROW, emulated_rows, library_rows, node_rows
+from studies.targets.running import EMULATED, ROW, emulated_rows, library_rows
 from tests.build.targets import BUILT, assert_same_bits, build, need_linker, need_program
 
 LAW = "admittance-backstepping"
@@ -42,12 +42,6 @@ def aarch64(tmp_path_factory):
 
 
 @pytest.fixture
-def in_node(wasm, tmp_path):
-    need_program("node", "nodejs")
-    return lambda name, *make, **options: node_rows(wasm, list(make), tmp_path, PERIODS, **options)[0]
-
-
-@pytest.fixture
 def in_c(library):
     return lambda name, *make, **options: library_rows(library, name, PERIODS, **options)
 
@@ -59,7 +53,7 @@ def on_aarch64(aarch64):
 
 @pytest.fixture(params=["in_node", "in_c"])
 def rows_of(request):
-    """Rows of a built loop, by its name in C; ``make`` is a method of ``Bundle`` and its arguments, for JavaScript."""
+    """Rows of a built loop, by its name in C."""
     return request.getfixturevalue(request.param)
 
 

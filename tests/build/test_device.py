@@ -11,13 +11,11 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.bench.evaluation import evaluate
+from baselines import evaluate, make_controller
 from baselines.controller import PlainLaw
-from baselines.registry import make_controller
 from birthsim_build.device import machine
 from birthsim_build.device.evaluation import evaluate_on
-from birthsim_env import ForceProfile, Parameters, StiffnessSchedule
-from birthsim_env.parts.references import Trajectory
+from birthsim_env import ForceProfile, Parameters, StiffnessSchedule, Trajectory
 from tests.build.targets import imported, need_device, need_threads
 from tests.oracles.golden import fingerprints
 

@@ -17,11 +17,10 @@ from birthsim_build.commands import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.description import exponents
-from birthsim_env import Parameters
+from birthsim_env import Parameters, Plant
 from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import load_parameters
 from tests.build.targets import build, imported, need_linker
 from tests.console import ROOT
@@ -269,18 +268,15 @@ def test_setpoints_that_the_law_cannot_serve_are_refused_and_a_saved_state_goes_
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_calls_out_of_turn_are_refused(written, unit, version):
+def test_calls_out_of_turn_and_impossible_parameters_are_refused(written, unit, version):
     one = unit(written("--fmi", version))
     for call_of in (one.unit.enterInitializationMode, one.unit.exitInitializationMode):
         with pytest.raises(fmpy.fmi1.FMICallException, match="InitializationMode"):
             call_of()
     with pytest.raises(fmpy.fmi1.FMICallException, match="DoStep"):
         one.unit.doStep(currentCommunicationPoint=5.0, communicationStepSize=PERIOD)
-
-
-def test_impossible_parameters_are_refused(written, unit):
-    with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
-        unit(written("--fmi", 2), **{"rig.mechanics.mass": -1.0})
+    with pytest.raises(fmpy.fmi1.FMICallException, match=r"fmi\dSet(Real|Float64)"):
+        unit(written("--fmi", version), **{"rig.mechanics.mass": -1.0})
 
 
 def test_units_are_those_of_the_rig():

@@ -10,23 +10,17 @@ from birthsim_build.image import HEAD, LEFT_OUT
 from birthsim_build.layout import ROWS
 from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
 from studies.targets.reference import PERIODS, SHARED, loop_rows
-from studies.targets.running import ROW, library_loop, node_rows
-from tests.build.targets import assert_same_bits, need_program
+from studies.targets.running import ROW, library_loop
+from tests.build.targets import assert_same_bits
 
 LOOP = {"scenario": "circle", "sensors": "ideal", "controller": "admittance-backstepping"}
-
-
-@pytest.fixture
-def in_node(wasm, tmp_path):
-    need_program("node", "nodejs")
-    return lambda choice=LOOP, **options: node_rows(wasm, ["loop", choice], tmp_path, PERIODS, **options)[0]
 
 
 def test_setpoints_and_a_hand_s_force_pass_over(in_node):
     at, since = 1300, (np.arange(PERIODS) - 1300) * 1e-3  # a push of the scenario is on
     later, once = np.where(since >= 0, 0.0, 1.0), np.where(since == 0, 1.0, 0.0)
     inputs = {"keep_Kclx": later, "keep_force": later, "pass_setpoints": once, "pass_force": once}
-    rows = in_node(inputs={**inputs, "add_Kclx": np.where(since >= 0, 3000.0, 0.0)})
+    rows = in_node("", "loop", LOOP, inputs={**inputs, "add_Kclx": np.where(since >= 0, 3000.0, 0.0)})
     stiffness, force = rows[:, ROW["reference_Kclx"]], rows[:, ROW["force_x"]]
     assert force[at - 1] > 1
     assert (stiffness[at], force[at]) == (stiffness[at - 1], force[at - 1])
@@ -40,7 +34,7 @@ def test_setpoints_and_a_hand_s_force_pass_over(in_node):
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_another_law_takes_over(in_node, sensors):
     exchange = {"at": 777, "controller": "residual:circle", "sensors": sensors}
-    rows = in_node({**LOOP, "sensors": sensors}, exchange=exchange)
+    rows = in_node("", "loop", {**LOOP, "sensors": sensors}, exchange=exchange)
     assert_same_bits(rows[:, SHARED], loop_rows("circle", sensors, LOOP["controller"], exchange=exchange)[:, SHARED])
 
 

@@ -6,8 +6,7 @@ from functools import partial
 
 import pytest
 
-from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.files import finite
 from studies.comparison import stiffness as studies
@@ -25,12 +24,9 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     files = {f"error_over_time.{kind}" for kind in ("png", "svg")} | {f"evaluation.{kind}" for kind in ("csv", "json", "md")}
     assert {path.name for path in out.iterdir()} == files | {".lock", "pieces", "times.json"}
     table = (out / "evaluation.md").read_text()
-    assert table.splitlines()[0] in printed
     assert table.startswith("BirthSIM/Probe-v2, 3 episodes from seed 7, ideal sensors, --randomize all")
-    assert "| metric | unit | backstepping: median | 95 % | max | backstepping-weight: median | 95 % | max |" in table
-    assert "| lost episodes |  | 0 of 3 |  |  | 0 of 3 |  |  |" in table
+    assert table.splitlines()[0] in printed
     figures = (out / "evaluation.csv").read_text().splitlines()
-    assert figures[0] == "metric,unit,controller,value,q95,max"
     assert "lost episodes,of 3,backstepping-weight,0,," in figures
     content = strict(out / "evaluation.json")
     assert content["arguments"]["env"] == "BirthSIM/Probe-v2"
@@ -71,7 +67,6 @@ class Fails(Slam):
     def command(self, measurement, reference):
         raise RuntimeError("no law at all")
 """
-NARROW = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2)
 
 
 @pytest.fixture
@@ -88,10 +83,11 @@ def small_studies(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys):
+def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
-    arguments = (*NARROW, "--plant", "nominal", "randomised", "--controller", "backstepping", slam, "--jobs", 1, "--out", out)
+    world = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2, "--plant", "nominal", "randomised")
+    arguments = (*world, "--controller", "backstepping", slam, "--jobs", 1, "--out", out)
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments)
     assert status == 0, complained
     assert "Warning" not in complained
@@ -99,6 +95,7 @@ def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys
     assert "4/4 " in complained
     content = strict(out / "comparison.json")
     assert content["settings"]["controller"] == ["backstepping", slam]
+    assert "out" not in content["settings"], "results do not depend on where they are"
     cells = {(cell["controller"], cell["plant"]): cell for cell in figures_of(content)}
     assert set(cells) == {(name, plant) for name in ("backstepping", slam) for plant in ("nominal", "randomised")}
     law, lost = cells["backstepping", "nominal"], cells[slam, "nominal"]
@@ -111,15 +108,6 @@ def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys
     for name in ("settled_error", "air_against_error"):
         assert_picture(out, name)
         assert f"{name}.png" in printed
-    # Once more: nothing is computed, and all is the same.
-    written = {path: path.stat().st_mtime_ns for path in out.rglob("*.json") if path.parent != out}
-    assert len(written) == 4
-    status, again, _ = call("comparison", monkeypatch, capsys, *arguments)
-    assert status == 0
-    assert "comparison: 4 of 4 are there with these settings, rig and code, and are kept" in again
-    assert {path: path.stat().st_mtime_ns for path in written} == written
-    assert (out / "comparison.md").read_text() == text
-    assert strict(out / "comparison.json")["figures"] == content["figures"]
 
 
 @pytest.mark.slow
@@ -137,46 +125,19 @@ def test_how_the_stiffness_feels_is_kept_and_drawn(tmp_path, monkeypatch, capsys
         assert f"{name}.png" in printed
 
 
-WAITING = """
-import os, pathlib, time
-
-class Waits(Slam):
-    '''Until there is a file "go" beside this one, or nobody to wait for.'''
-    def command(self, measurement, reference):
-        began_by = os.getppid()
-        while not pathlib.Path(__file__).with_name("go").exists() and os.getppid() == began_by:
-            time.sleep(0.01)
-        return super().command(measurement, reference)
-"""
-
-
-@pytest.mark.slow
-def test_the_comparison_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
-    """Two pieces side by side: one is complete at Ctrl-C, the other one waits for what comes only afterwards."""
-    own, out = tmp_path / "own.py", tmp_path / "out"
-    own.write_text(OWN + WAITING)
-    names = ("--controller", f"{own}:Slam", f"{own}:Waits")
-    line = (*NARROW[:-1], 1, "--jobs", 2, "--plant", "randomised", *names, "--out", out)
-    status, _ = interrupted("comparison", line, lambda: list(out.rglob("*.json")))
-    assert status == 130
-    assert len(list(out.rglob("*.json"))) == 1
-    (tmp_path / "go").touch()
-    status, printed, _ = call("comparison", monkeypatch, capsys, *line)
-    assert status == 0
-    assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
-    assert "out" not in strict(out / "comparison.json")["settings"], "results do not depend on where they are"
-
-
 @pytest.mark.usefixtures("brief")
 def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
+    """With drawn sensors, whose case is named in words of its own."""
     (tmp_path / "own.py").write_text(OWN + FAILING)
     fails = f"{tmp_path}/own.py:Fails"
-    arguments = (*NARROW, "--plant", "nominal", "--jobs", 1, "--controller", fails, "backstepping")
+    world = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--plant", "drawn-sensors")
+    arguments = (*world, "--jobs", 1, "--controller", fails, "backstepping")
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
     assert "| backstepping |" in printed
     assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
+    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     assert [cell["controller"] for cell in figures_of(strict(tmp_path / "out" / "comparison.json"))] == ["backstepping"]
 
 
@@ -189,11 +150,3 @@ def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     assert status == 130
     assert f"episodes: {len(kept)} of 1563 are complete and kept; the same command goes on" in printed
     assert [path for path in out.rglob("*") if path.is_file() and path not in (*kept, out / ".lock")] == [], "no half a file"
-
-
-def test_the_comparison_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
-    own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
-    case = ("--plant", "drawn-sensors", "--out", tmp_path / "out")
-    status, _, complained = call("comparison", monkeypatch, capsys, *own, *case)
-    assert status == 0, complained
-    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()

@@ -1,6 +1,5 @@
 """birthsim tune: its search on costs that are known, its files, its costs on the plant, plain errors."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -159,11 +158,3 @@ def test_trials_of_another_search_are_not_mixed_in(own, tmp_path, trial_costs, m
     Path(own.removesuffix(":Own")).write_text(OWN + TUNED + "\n")
     assert run("--trials", 3) == 0
     assert tried[9:] == first, "a controller's file that changed is another controller"
-
-
-def test_without_the_extra_it_says_how_to_get_it(own, tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "optuna", None)
-    status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
-    assert status == 2
-    assert "pip install 'birthsim[tune]'" in complained
-    assert not (tmp_path / "out").exists()

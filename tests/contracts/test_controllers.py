@@ -12,9 +12,8 @@ from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
 from baselines.registry import CONTROLLERS, LIMITED, LISTED, controller_names, known_options, make_controller
 from baselines.staged import COMMAND_OPTIONS
-from birthsim_env.loop.signals import Reference
+from birthsim_env import Parameters, Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 

@@ -10,8 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines import evaluate, make_controller
 from baselines.staged import driving
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import SCENARIOS

@@ -10,12 +10,11 @@ import pytest
 
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, override
-from baselines import AdmittanceController, BacksteppingController
-from baselines.bench.evaluation import evaluate
+from baselines import AdmittanceController, BacksteppingController, evaluate, make_controller
 from baselines.limiter.controller import PortLimiter
-from baselines.registry import make_controller
 from baselines.rivals.symbolic import symbolic_model
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
+from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import Noise
@@ -218,6 +217,7 @@ TABLE = [
     (BacksteppingController, "valves", ("three",), "two_valves, one_valve"),
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
+    (partial(Renderer(RIG, 320, 240).show, None), "frames_per_second", (0.0, -1.0, NAN, INF), ""),
     (symbolic_model, "algebra", ("maple",), "'sympy', 'casadi'"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),
 ]  # fmt: skip

@@ -6,10 +6,9 @@ import pytest
 
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.sb3.shifted_reward import ShiftedReward
-from baselines import BacksteppingController
+from baselines import BacksteppingController, make_controller
 from baselines.controller import checked_command
 from baselines.identification.experiment import propose
-from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.gradients import Recorder

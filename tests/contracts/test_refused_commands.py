@@ -1,6 +1,7 @@
 """Commands that are refused: status 2, one line that names what is wrong and what is allowed, and nothing written."""
 
 import shlex
+import sys
 
 import pytest
 
@@ -171,11 +172,21 @@ TABLE = {
     "live --static own": "--static 'own' is not empty; allowed: a new or empty folder",
 }
 
+GONE = {
+    "tune --controller pid --out x": ("optuna", "tune"), "live --port 0": ("uvicorn", "live"),
+    "live --port 0 --replay a.rec": ("uvicorn", "live"),
+}  # fmt: skip
+"""Command -> a package that is not installed, and the extra that has it."""
+TABLE |= {line: f"pip install 'birthsim[{extra}]'" for line, (_, extra) in GONE.items()}
+
 
 @pytest.mark.parametrize("line", TABLE)
 def test_a_command_is_refused_in_one_line_and_leaves_nothing(line, tmp_path, monkeypatch, capsys):
     if "--to fmu" in line:
         need_linker()
+    if line in GONE:
+        monkeypatch.setitem(sys.modules, GONE[line][0], None)
+        monkeypatch.setattr("birthsim_live.commands.live.packed_page", None)  # before anything is compiled
     monkeypatch.chdir(tmp_path)
     for name, content in FILES.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)

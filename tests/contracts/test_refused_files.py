@@ -12,6 +12,8 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.own_parts import stiffness_of
 from birthsim_live.logs.reading import read_log
+from studies.sweeps.plan import load_sweep
+from studies.sweeps.work import tasks_of
 
 CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()
@@ -30,6 +32,7 @@ READERS = {
     "controller": lambda path: make_controller(path, RIG),
     "training": load_configuration,
     "plan": lambda path: read_plan(path, RIG),
+    "sweep": lambda path: tasks_of((sweep := load_sweep(path)).points[0], sweep),
     "log": read_table,
     "recorded": lambda path: read_log(Path(path)),
 }
@@ -157,6 +160,48 @@ TABLE = {
         (rows("{0},0.5,0,2,0,0,0\n"), "", "an added opening of 2; allowed: -1 to 1"),
         (rows("{0},1.5,0,0,0,0,0\n"), "", "position = (1.5, 0) m is unreachable"),
         (rows("{2:g},0.5,0,0,0,0,0\n"), "", "lasts 0.8 s; allowed: 4 to 600 s"),
+    ],
+    ("sweep", "sweep.toml"): [
+        (text, "", "sweep.toml", *said, "allowed")
+        for text, *said in (
+            ("[gird]\nsensors = ['lab']", "'gird'", "[base], [grid], [draw], [search] and [[map]]"),
+            ("[base]\ncolour = 'red'", "'colour'", "environment, controller, "),
+            ("[grid]\nsensors = 'lab'", "[grid] sensors = 'lab'", "a list of values, or "),
+            ("[grid]\n'gain.bandwidth' = {from = 3, to = 2, count = 2}", "from below to"),
+            ("[grid]\n'gain.bandwidth' = {from = 1, to = 2}", "count = None", "a whole number from 2"),
+            ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 2, step = 1}", "{ from, to, count, log }"),
+            ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 4000000000}", "count"),
+            ("[draw]\nsensors = ['lab']", "[draw] count = None", "a whole number from 1"),
+            ("[draw]\ncount = 2000000\nsensors = ['lab']", "makes 2000000 points", "at most 1000000"),
+            ("[base]\nepisodes = 0", "[base] episodes = 0", "a whole number from 1"),
+            ("[search]\ntrials = 3", "[search] has no ranges", "names with"),
+            ("[search]\n'gain.bandwidth' = [1, 2]", "[search] gain.bandwidth = [1, 2]", "{ from, to, log }"),
+            ("[grid]\nsensors = ['lab']\n[[map]]\nx = 'sensors'", "[[map]]", "x, y and perhaps"),
+            ("[[map]]\nx = 'sensors'\ny = 'policy'", "x = 'sensors'", "what varies"),
+            ("[base]\npolicy = ''", "policy", "a word"),
+            ("[grid]\ncontroller = [1, 'pid']", "controller = 1", "a word"),
+            ("[draw]\ncount = 1\nenvironment = [2000-01-01]", "environment", "a word"),
+            ("[base]\nsensors = 'perfect'", "sensors", "'lab'"),
+            ("[grid]\nrandomize = ['no']", "randomize", "True"),
+            ("[grid]\nsensors = {from = 1, to = 2, count = 2}", "sensors", "a list of values"),
+            ("[search]\nreference = {from = 1, to = 2}", "reference", "from, to, log"),
+            ("[grid]\n'gain.bandwidth' = [[1]]", "gain.bandwidth", "a number"),
+            ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 2, log = 'no'}", "gain.bandwidth log", "true, false"),
+            ("[search]\ntrials = 2000000\n'gain.bandwidth' = {from = 1, to = 2}", "trials", "1000000"),
+            ("[search]\nmetric = 'best'\n'gain.bandwidth' = {from = 1, to = 2}", "metric", "settled_rms"),
+            ("[[map]]\nx = ['a']\ny = {}", "x", "what varies"),
+            ("[grid]\nsensors = ['lab']\n[[map]]\nx = 'sensors'\ny = 'sensors'\nstatistic = []", "statistic", "'median'"),
+            ("[base]\n'training.seed' = 1", "training.seed", "train"),
+            ("[base]\ntrain = 'circle'\n[grid]\n'training.stepz' = [1]", "training.stepz", "steps"),
+            ("[base]\ntrain = 'circle'\n[grid]\ncontroller = ['pid']", "controller", "without it"),
+            ("[base]\npolicy = 'circle'\n[grid]\ncontroller = ['pid']", "controller", "'residual'"),
+            ("[base]\nsensors = 'lab'\n[draw]\ncount = 1\nsensors = ['ideal']", "sensors", "once"),
+        )
+    ],
+    ("sweep", "points.toml"): [
+        ("[grid]\n'rig.mechanics.mas' = [3.0]", "", "mechanics.mas"),
+        ("[grid]\n'gain.bandwith' = [60.0]", "", "bandwith"),
+        ("[grid]\npolicy = ['nowhere']", "", "nowhere"),
     ],
     ("log", "none.parquet"): [(None, "", "cannot be read")],
     ("log", "log.txt"): [("", "", "allowed: a file that ends in .csv, .parquet, .mcap")],

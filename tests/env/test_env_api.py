@@ -6,8 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-import birthsim_env
-from birthsim_env import Parameters
+from birthsim_env import ForceProfile, Hold, Parameters
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.control_model import active_flow
@@ -19,15 +18,17 @@ CIRCLE, PROBE = IDS[0], IDS[1]
 FACES = tuple(itertools.product(("valve", "flow"), ("two_valves", "one_valve"), ("ideal", "lab")))
 
 
-def make(name=CIRCLE, **arguments) -> BirthSIMEnv:
+def make(name=CIRCLE, **arguments):
     env = gymnasium.make(name, **arguments).unwrapped
     assert isinstance(env, BirthSIMEnv)
     return env
 
 
 def run(env, actions, seed=0):
-    """Observations of an episode that starts from ``seed``, that of ``reset`` first."""
-    return np.array([env.reset(seed=seed)[0], *(env.step(action)[0] for action in actions)])
+    """Observations and infos of an episode that starts from ``seed``, those of ``reset`` first."""
+    rows = [env.reset(seed=seed), *(env.step(action)[::4] for action in actions)]
+    observations, infos = zip(*rows, strict=True)
+    return np.array(observations), infos
 
 
 def random_actions(count, size, reach=0.2, seed=0):
@@ -44,22 +45,18 @@ def test_spaces_and_names_have_the_size_of_the_valve_layout(face):
     assert all(name.startswith("last action") for name in env.observation_names[20:])
 
 
-@pytest.mark.parametrize(("name", "seconds"), list(zip(IDS, SECONDS.values(), strict=True)))
-def test_a_full_episode_is_truncated_exactly_at_the_end(name, seconds):
+EPISODES = [*((name, None, 0.05, 20 * seconds) for name, seconds in zip(IDS, SECONDS.values(), strict=True))]
+EPISODES += [(CIRCLE, *one) for one in ((0.2, 0.01, 20), (0.2, 0.001, 200), (0.21, 0.03, 7), (0.5, 0.25, 2))]
+
+
+@pytest.mark.parametrize(("name", "duration", "period", "steps"), EPISODES)
+def test_an_episode_is_truncated_exactly_at_its_end(name, duration, period, steps):
     # Holding still needs a hand on the valves: keep the episode alive without any force of the user.
-    env = make(name, user_force=birthsim_env.ForceProfile(), reference=birthsim_env.Hold((0.5, 0.0)), policy_period=0.05)
+    env = make(name, duration=duration, policy_period=period, user_force=ForceProfile(), reference=Hold((0.5, 0.0)))
     env.reset(seed=0)
-    ends = [env.step(np.zeros(4))[2:4] for _ in range(20 * seconds)]
-    assert ends == [(False, False)] * (20 * seconds - 1) + [(False, True)]
-
-
-def test_duration_and_policy_period_set_the_number_of_steps():
-    for duration, period, steps in ((0.2, 0.01, 20), (0.2, 0.001, 200), (0.21, 0.03, 7), (0.5, 0.25, 2)):
-        env = make(duration=duration, policy_period=period)
-        env.reset(seed=0)
-        ends = [env.step(np.zeros(4))[3] for _ in range(steps)]
-        assert ends == [False] * (steps - 1) + [True]
-        assert env.simulation.time[0] == pytest.approx(duration)
+    ends = [env.step(np.zeros(4))[2:4] for _ in range(steps)]
+    assert ends == [(False, False)] * (steps - 1) + [(False, True)]
+    assert env.simulation.time[0] == pytest.approx(steps * period)
 
 
 @pytest.mark.parametrize("push", [(0, 0, 1, -1), (0, 0, -1, 1), (1, -1, 0, 0), (-1, 1, 0, 0)])
@@ -118,7 +115,7 @@ def test_reset_starts_on_the_target_or_where_it_is_told_to():
 
 @pytest.mark.parametrize("name", IDS)
 def test_chambers_start_in_balance_at_the_stiffness_asked_for(name):
-    env = make(name, randomize="scenario", user_force=birthsim_env.ForceProfile())
+    env = make(name, randomize="scenario", user_force=ForceProfile())
     for seed in range(5):
         _, info = env.reset(seed=seed)
         np.testing.assert_allclose(info["pneumatic_stiffness"], info["pneumatic_stiffness_setpoint"], rtol=1e-9)
@@ -130,15 +127,15 @@ def test_chambers_start_in_balance_at_the_stiffness_asked_for(name):
 def test_a_longer_policy_period_holds_the_action_over_the_same_plant():
     fine, coarse = make(policy_period=0.001), make(policy_period=0.01)
     actions = random_actions(30, 4)
-    fine_rows = run(fine, np.repeat(actions, 10, axis=0))[::10]
-    coarse_rows = run(coarse, actions)
-    np.testing.assert_array_equal(fine_rows[:, :20], coarse_rows[:, :20])
+    many, few = run(fine, np.repeat(actions, 10, axis=0))[0], run(coarse, actions)[0]
+    np.testing.assert_array_equal(many[::10, :20], few[:, :20])
 
 
 def test_one_valve_is_two_valves_with_opposite_openings():
     actions = random_actions(300, 2, reach=0.5)
     both = np.stack([actions[:, 0], -actions[:, 0], actions[:, 1], -actions[:, 1]], axis=1)
-    np.testing.assert_array_equal(run(make(valves="one_valve"), actions)[:, :20], run(make(), both)[:, :20])
+    one, two = run(make(valves="one_valve"), actions)[0], run(make(), both)[0]
+    np.testing.assert_array_equal(one[:, :20], two[:, :20])
 
 
 @pytest.mark.parametrize("valves", ["two_valves", "one_valve"])
@@ -174,4 +171,8 @@ def test_frames_are_pictures_and_a_window_shows_nothing_else(monkeypatch):
     assert window.step(np.zeros(4))[0].shape == (24,)
     assert window.render() is None
     window.close(), window.close(), env.close()
-    assert make().render() is None
+    lanes = gymnasium.make_vec(CIRCLE, num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
+    lanes.reset(seed=0)
+    assert [(frame.shape, frame.dtype) for frame in lanes.render()] == [((300, 400, 3), np.uint8)] * 2
+    lanes.close(), lanes.close()
+    assert make().render() is gymnasium.make_vec(CIRCLE, num_envs=2).render() is None

@@ -11,19 +11,8 @@ from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.reward import REWARD_TERMS
-from tests.env.test_env_api import IDS, make, random_actions
+from tests.env.test_env_api import IDS, make, random_actions, run
 from tests.oracles import linkage_by_points as by_points
-
-
-def run(env, actions, seed=0):
-    """Observations, rewards and infos of an episode that starts from ``seed``; the first row is that of ``reset``."""
-    observation, info = env.reset(seed=seed)
-    rows = [(observation, 0.0, info)]
-    for action in actions:
-        observation, reward, _, _, info = env.step(action)
-        rows.append((observation, reward, info))
-    observations, rewards, infos = zip(*rows, strict=True)
-    return np.array(observations), np.array(rewards), infos
 
 
 def test_the_table_in_the_docstring_is_the_table_of_entries():
@@ -59,7 +48,7 @@ def along_cylinders(info):
 def test_an_ideal_observation_is_info_over_the_documented_scales(name):
     env = make(name, randomize=True)
     actions = random_actions(120, 4)
-    observations, _, infos = run(env, actions, seed=5)
+    observations, infos = run(env, actions, seed=5)
     for k, (seen, info) in enumerate(zip(observations, infos, strict=True)):
         external = 1.013e5 * math.pi / 4 * 0.010**2
         target = env.simulation.trajectory.sample(np.array([info["time"]]))[:, 0]
@@ -81,7 +70,7 @@ def test_an_ideal_observation_is_info_over_the_documented_scales(name):
 
 def test_info_has_every_documented_field_and_agrees_with_the_plant():
     env = make("BirthSIM/Forceps-v1", randomize=True)
-    _, _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
+    _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
     for step, info in enumerate(infos):
         assert set(info) == {*FIELDS, *REWARD_TERMS, "is_success"}
         for field, (size, _) in FIELDS.items():
@@ -89,13 +78,13 @@ def test_info_has_every_documented_field_and_agrees_with_the_plant():
         assert info["time"] == pytest.approx(0.01 * step, abs=1e-12)
     plant, info = env.simulation.plant, infos[-1]
     motion, flows = plant.end_effector()[:, 0], plant.mass_flows()[:, 0]
-    np.testing.assert_array_equal(info["position"], motion[:2])
-    np.testing.assert_array_equal(info["velocity"], motion[2:])
-    np.testing.assert_array_equal(info["piston_position"], plant.piston[:, 0])
-    np.testing.assert_array_equal(info["piston_velocity"], plant.piston_speed[:, 0])
-    np.testing.assert_array_equal(info["pressure"], plant.pressures[:, 0])
-    np.testing.assert_array_equal(info["temperature"], plant.temperatures[:, 0])
-    np.testing.assert_array_equal(info["opening"], plant.state[14:, 0])
+    rows = {
+        "position": motion[:2], "velocity": motion[2:], "piston_position": plant.piston[:, 0], "opening": plant.state[14:, 0],
+        "piston_velocity": plant.piston_speed[:, 0], "pressure": plant.pressures[:, 0],
+        "temperature": plant.temperatures[:, 0],
+    }  # fmt: skip
+    for name, row in rows.items():
+        np.testing.assert_array_equal(info[name], row, err_msg=name)
     assert info["supply_flow"] == pytest.approx(np.maximum(flows[:4], 0).sum())
     bore, rod = math.pi / 4 * 0.025**2, math.pi / 4 * 0.010**2
     pp, pn, length = info["pressure"][0::2] * bore, info["pressure"][1::2] * (bore - rod), np.array([0.1, 0.2])

@@ -2,13 +2,15 @@
 
 import inspect
 import re
+from functools import partial
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import wrappers
+from gymnasium.wrappers import vector as lanes
 
-from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.assembly import DEFAULTS, Arguments
 from birthsim_env.env import BirthSIMEnv
@@ -16,29 +18,40 @@ from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 CIRCLE = "BirthSIM/Circle-v1"
+single, vector = partial(gymnasium.make, CIRCLE), partial(gymnasium.make_vec, CIRCLE, num_envs=2)
+both = pytest.mark.parametrize("make", [single, vector], ids=["single", "vector"])
 
 
-def single(**arguments):
-    return gymnasium.make(CIRCLE, **arguments)
-
-
-def vector(**arguments):
-    return gymnasium.make_vec(CIRCLE, num_envs=2, **arguments)
-
-
-@pytest.mark.parametrize("make", [single, vector])
-def test_a_specification_has_the_steps_of_an_episode(make):
+@both
+def test_steps_of_an_episode_rig_and_time_step_are_attributes(make):
     assert make().unwrapped.spec.max_episode_steps == 1600
-    assert make(duration=2.0, policy_period=0.02).unwrapped.spec.max_episode_steps == 100
     assert make(max_episode_steps=7).spec.max_episode_steps == 7
+    for heavier in ({"mechanics": {"mass": 4.0}}, {"mechanics.mass": 4.0}):
+        env = make(parameters=heavier, duration=2.0, policy_period=0.02).unwrapped
+        assert (env.spec.max_episode_steps, env.dt) == (100, 0.02)
+        assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
 
 
-@pytest.mark.parametrize("make", [single, vector])
-@pytest.mark.parametrize("heavier", [{"mechanics": {"mass": 4.0}}, {"mechanics.mass": 4.0}], ids=str)
-def test_rig_and_time_step_are_attributes(make, heavier):
-    env = make(parameters=heavier, policy_period=0.02).unwrapped
-    assert env.dt == 0.02
-    assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
+PICTURES = {"render_mode": "rgb_array", "picture_size": (320, 240)}
+ENDING = {mode: partial(vector, duration=0.08, autoreset_mode=mode) for mode in ("NextStep", "SameStep")}
+WRAPPED = {
+    "a picture as observation": lambda: wrappers.AddRenderObservation(single(**PICTURES), render_only=True),
+    "pictures in a list": lambda: wrappers.RenderCollection(single(**PICTURES)),
+    **{f"information in a list, {mode}": lambda made=made: lanes.DictInfoToList(made()) for mode, made in ENDING.items()},
+    "flat": lambda: lanes.VectorizeTransformObservation(ENDING["NextStep"](), wrappers.FlattenObservation),
+}
+
+
+@pytest.mark.parametrize("wrapped", WRAPPED.values(), ids=WRAPPED)
+def test_wrappers_that_use_more_than_arrays_in_boxes(wrapped):
+    """Pictures, and the information of lanes that have ended; ``studies/clients`` has the others."""
+    env = wrapped()
+    env.reset(seed=0)
+    for _ in range(20):
+        observation, reward, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
+        assert np.shape(observation) == env.observation_space.shape
+        assert np.isfinite(reward).all()
+    env.close()
 
 
 def test_a_number_is_a_stiffness_of_both_axes_for_all_time():
@@ -49,7 +62,7 @@ def test_a_number_is_a_stiffness_of_both_axes_for_all_time():
         np.testing.assert_array_equal(env.step(np.zeros(4))[4]["stiffness_setpoint"], 1500.0)
 
 
-@pytest.mark.parametrize("make", [single, vector])
+@both
 def test_all_numbers_in_info_are_numpys(make):
     """`is_success` of a single environment is a bool: Gymnasium's own conversion to tensors knows no NumPy one."""
     env = make()
@@ -57,7 +70,7 @@ def test_all_numbers_in_info_are_numpys(make):
         assert all(isinstance(value, (np.generic, np.ndarray, bool)) for value in info.values()), info
 
 
-@pytest.mark.parametrize("make", [single, vector])
+@both
 def test_actions_beyond_one_are_clipped_by_choice(make):
     wrong, right = make(clip_actions=True), make()
     wrong.reset(seed=0), right.reset(seed=0)
@@ -119,9 +132,8 @@ def test_every_argument_that_is_shown_is_taken():
 
 def test_info_says_what_a_step_costs():
     """Against the state of the plant, its flows and the parameters, until open valves have driven a piston into its stop."""
-    env = vector(
-        policy_period=0.001, user_force=lambda time: (30.0, -40.0), randomize="plant", autoreset_mode="Disabled"
-    )  # fmt: skip
+    hand = {"user_force": lambda time: (30.0, -40.0)}
+    env = vector(policy_period=0.001, randomize="plant", autoreset_mode="Disabled", **hand)
     env.reset(seed=3)
     plant, used, deepest, largest, costs = env.unwrapped.simulation.plant, np.zeros(2), 0.0, 0.0, set()
     for _ in range(900):

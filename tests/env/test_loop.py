@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import agents  # noqa: F401  registers the residual environments
-from birthsim_env import StiffnessSchedule
+from birthsim_env import Circle, StiffnessSchedule
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.parts.hands.user_forces import AlternatingSteps, ForceProfile
-from birthsim_env.parts.references import Circle
 from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"

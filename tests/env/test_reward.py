@@ -4,9 +4,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from birthsim_env import StiffnessSchedule, reward
+from birthsim_env import Reference, StiffnessSchedule, reward
 from birthsim_env.loop.rows import World
-from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import PRESSURES, TEMPERATURES, Y1, Y2
 

@@ -1,8 +1,11 @@
 """The native vector environment: every lane is the single environment of its seed, through all of its episodes."""
 
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 
 from birthsim_env.info import FIELDS
 from birthsim_env.reward import REWARD_TERMS
@@ -11,7 +14,7 @@ from birthsim_env.vector_env import BirthSIMVectorEnv
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
 
 
-def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
+def make(name=CIRCLE, lanes=3, **arguments):
     env = gymnasium.make_vec(name, num_envs=lanes, **{"autoreset_mode": "SameStep", **arguments})
     assert type(env) is BirthSIMVectorEnv
     return env
@@ -108,10 +111,30 @@ def test_staggered_lanes_end_one_after_the_other_and_live_in_the_same_worlds():
     assert ends == sorted((40 * k - 10 * lane, lane) for lane in range(4) for k in range(1, 5) if 40 * k - 10 * lane <= 120)
 
 
-def test_frames_of_every_lane_and_closing_twice():
-    env = make(lanes=2, render_mode="rgb_array", picture_size=(400, 300))
+ENDING = partial(gymnasium.make_vec, PROBE, num_envs=2, duration=0.4, randomize=True)
+SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0]], np.float32)
+
+
+def test_the_next_step_is_gymnasiums_own_default_and_does_what_its_vectorization_does():
+    native, generic = ENDING(), ENDING(vectorization_mode="sync")
+    assert native.autoreset_mode is native.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    np.testing.assert_array_equal(native.reset(seed=3)[0], generic.reset(seed=3)[0])
+    ends = 0
+    for _ in range(120):
+        (*mine, info), (*its, other) = native.step(SLAM), generic.step(SLAM)
+        for one, expected in zip([*mine, info["position"]], [*its, other["position"]], strict=True):
+            np.testing.assert_array_equal(one, expected)
+        ends += mine[2] + mine[3]
+    assert (ends >= 2).all(), "both lanes begin anew, one after it was lost, one at its end"
+
+
+def test_a_lane_waits_for_its_reset_where_autoreset_is_disabled():
+    env = ENDING(autoreset_mode="Disabled")
     env.reset(seed=0)
-    frames = env.render()
-    assert [(frame.shape, frame.dtype) for frame in frames] == [((300, 400, 3), np.uint8)] * 2
-    env.close(), env.close()
-    assert make().render() is None
+    while not (terminated := env.step(SLAM)[2]).any():
+        pass
+    with pytest.raises(ValueError, match=r"lanes \[0\] have ended; allowed: reset\(options=\{'reset_mask': ...\}\)"):
+        env.step(SLAM)
+    _, info = env.reset(options={"reset_mask": terminated})
+    assert info["time"][0] == 0.0 < info["time"][1]
+    env.step(SLAM)

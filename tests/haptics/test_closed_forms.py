@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from baselines.impedance import DeclaredMotion, mass_spring_damper
-from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics import backdriving, release
 from studies.haptics.backdriving import beyond_spring, guiding_hand
 from studies.haptics.impedance import (
@@ -20,7 +19,7 @@ from studies.haptics.impedance import (
 )
 from studies.haptics.multisine import FREQUENCIES, FUNDAMENTAL, SECONDS, SETTLING, impedance_felt, measured_part, multisine_hand
 from studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
-from studies.haptics.recording import Recording, record
+from studies.haptics.recording import record
 from studies.haptics.release import PULL, flight, pulling_hand
 from studies.haptics.worlds import resting
 from studies.stability.maps import push_and_release
@@ -34,12 +33,12 @@ LIGHT, LATE, DRAG = 0.3, 0.05, 85.0
 """kg, s and N s/m with a spring of 2000 N/m: stable when free, and active at low frequencies, since K T = 100 N s/m."""
 
 
-def several(*values: float) -> Array:
+def several(*values):
     return np.array(values)
 
 
 @pytest.fixture(scope="module")
-def ideal() -> tuple[Recording, Array]:
+def ideal():
     """A mass, spring and damper under 10 N along x and askew."""
     direction = np.array([[1.0, 0.6], [0.0, 0.8]])
     port = IdealPort(several(MASS, MASS), several(DAMPING, DAMPING), several(STIFFNESS, STIFFNESS), target=several(0.5, 0.0))
@@ -47,14 +46,14 @@ def ideal() -> tuple[Recording, Array]:
 
 
 @pytest.fixture(scope="module")
-def late() -> tuple[Recording, Array]:
+def late():
     """A spring that answers 50 ms late."""
     direction = np.array([[1.0], [0.0]])
     port = IdealPort(several(LIGHT), several(DRAG), several(STIFFNESS), LATE)
     return record(port, multisine_hand(direction, several(10.0), 1), SECONDS), direction
 
 
-def test_a_mass_a_spring_and_a_damper_are_felt_as_they_are(ideal: tuple[Recording, Array]) -> None:
+def test_a_mass_a_spring_and_a_damper_are_felt_as_they_are(ideal):
     np.testing.assert_allclose(np.linalg.norm(ideal[0].force, axis=1).max(axis=0), 10.0, rtol=1e-3)
     felt, truth = impedance_felt(*ideal), impedance(FREQUENCIES, MASS, DAMPING, STIFFNESS)[:, None]
     assert np.abs(felt / truth - 1).max() < 2 * HELD_FORCE
@@ -64,7 +63,7 @@ def test_a_mass_a_spring_and_a_damper_are_felt_as_they_are(ideal: tuple[Recordin
     assert passivity_shortage(felt, FREQUENCIES).max() == 0
 
 
-def test_an_ideal_impedance_has_no_error_of_its_own_and_gives_no_energy(ideal: tuple[Recording, Array]) -> None:
+def test_an_ideal_impedance_has_no_error_of_its_own_and_gives_no_energy(ideal):
     recording, direction = ideal
     reference = resting([(0.5, 0.0)] * 2, [STIFFNESS] * 2)
     begin = SETTLING / FUNDAMENTAL
@@ -81,7 +80,7 @@ def test_an_ideal_impedance_has_no_error_of_its_own_and_gives_no_energy(ideal: t
     assert recording.energy.max() < 1e-12
 
 
-def test_where_an_impedance_would_be_agrees_with_its_matrix_exponential() -> None:
+def test_where_an_impedance_would_be_agrees_with_its_matrix_exponential():
     """Under forces that change from policy step to policy step, with coupled and unequal stiffness."""
     reference = resting([(0.5, 0.0)] * 2, [5000.0, 1000.0])
     reference.stiffness[1], reference.stiffness_coupling[0] = (2000.0, 4500.0), 300.0
@@ -96,7 +95,7 @@ def test_where_an_impedance_would_be_agrees_with_its_matrix_exponential() -> Non
 
 
 @pytest.mark.slow
-def test_a_late_spring_is_felt_late(late: tuple[Recording, Array]) -> None:
+def test_a_late_spring_is_felt_late(late):
     """Magnitude and phase as K exp(-sT), and the bandwidth that follows from them."""
     felt, truth = impedance_felt(*late)[:, 0], impedance(FREQUENCIES, LIGHT, DRAG, STIFFNESS, LATE)
     assert np.abs(felt / truth - 1).max() < 3e-3
@@ -109,7 +108,7 @@ def test_a_late_spring_is_felt_late(late: tuple[Recording, Array]) -> None:
     assert bandwidth(felt[:, None], declared[:, None], FREQUENCIES).tolist() == [expected]
 
 
-def test_a_late_spring_gives_the_energy_that_its_phase_says(late: tuple[Recording, Array]) -> None:
+def test_a_late_spring_gives_the_energy_that_its_phase_says(late):
     """Re(Fu/v) = b - K sin(wT)/w; over whole periods the port gives half of -|v|^2 Re(Fu/v) per second and line."""
     recording, direction = late
     felt, w = impedance_felt(recording, direction), 2 * np.pi * FREQUENCIES
@@ -124,7 +123,7 @@ def test_a_late_spring_gives_the_energy_that_its_phase_says(late: tuple[Recordin
     assert given == pytest.approx(-(SECONDS - SETTLING / FUNDAMENTAL) / 2 * (speed**2 * exact).sum(), rel=0.02)
 
 
-def test_noticeable_differences_are_those_of_compliance() -> None:
+def test_noticeable_differences_are_those_of_compliance():
     """15 % more compliant is one; the last line is that before the first miss."""
     declared = np.full((3, 1), 2000.0 + 0j)
     felt = declared / np.array([[1.15], [1.0], [1.30]])
@@ -134,7 +133,7 @@ def test_noticeable_differences_are_those_of_compliance() -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.6])
-def test_a_pull_let_go_swings_past_its_target(ratio: float) -> None:
+def test_a_pull_let_go_swings_past_its_target(ratio):
     """Overshoot F/K exp(-pi z/(1 - z^2)^(1/2)), largest speed F/K w exp(-z w t) where tan((1 - z^2)^(1/2) w t) = ..."""
     mass, stiffness = 30.0, 4000.0
     w, damped = math.sqrt(stiffness / mass), math.sqrt(1 - ratio**2)
@@ -146,7 +145,7 @@ def test_a_pull_let_go_swings_past_its_target(ratio: float) -> None:
     assert found["speed"][0] == pytest.approx(size * w * math.exp(-ratio / damped * math.atan2(damped, ratio)), rel=0.01)
 
 
-def test_moved_slowly_a_damper_is_all_that_a_spring_adds() -> None:
+def test_moved_slowly_a_damper_is_all_that_a_spring_adds():
     """1 N at 10 mm/s for 100 N s/m, along any direction; a hand of 4000 N/m leads a spring of 500 N/m at 8/9 of its speed."""
     direction = np.array([[1.0, 0.6], [0.0, 0.8]])
     port = IdealPort(several(3.0, 3.0), several(100.0, 100.0), several(500.0, 0.0))
@@ -159,7 +158,7 @@ def test_moved_slowly_a_damper_is_all_that_a_spring_adds() -> None:
 
 
 @pytest.mark.parametrize("hand", [0.0, 5000.0])
-def test_a_late_spring_is_stable_up_to_its_border(hand: float) -> None:
+def test_a_late_spring_is_stable_up_to_its_border(hand):
     """The border of stability in closed form, a fifth below and above it."""
     mass, drag, delay = 2.0, 60.0, 0.01
     border = stiffest(mass, drag, delay, hand)

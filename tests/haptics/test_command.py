@@ -1,8 +1,5 @@
 """birthsim study haptics: files, tables and figures, and what is refused."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -14,14 +11,14 @@ from studies.haptics.tables import backdriving_table, release_table
 from studies.stability import maps as stability
 from tests.console import OWN, call, strict
 
-SETTINGS: dict[str, Any] = {
+SETTINGS = {
     "controller": "admittance-backstepping", "source": "", "rig": Parameters().to_dict(), "sensors": "ideal", "seed": 3,
     "rigs": 2, "force_sensor": True,
 }  # fmt: skip
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
+def short(monkeypatch):
     """Few hands, a push at once, and a run of 0.15 s."""
     for name, value in (("PUSHED", 0.0), ("RELEASED", 0.05), ("JUDGED", 0.1), ("END", 0.15)):
         monkeypatch.setattr(stability, name, value)
@@ -32,7 +29,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("short")
-def test_a_map_of_hands_has_the_worst_rig() -> None:
+def test_a_map_of_hands_has_the_worst_rig():
     """Rows over masses, columns over stiffnesses; two rigs are as bad as the worse of each alone."""
     both = measure_hands(0.0, **SETTINGS)
     alone = [measure_hands(0.0, **{**SETTINGS, "seed": seed, "rigs": 1}) for seed in (3, 4)]
@@ -43,7 +40,7 @@ def test_a_map_of_hands_has_the_worst_rig() -> None:
 
 
 @pytest.mark.usefixtures("short")
-def test_z_width_says_what_is_refused() -> None:
+def test_z_width_says_what_is_refused():
     """Rows over damping where it can be asked for, else one; setpoints without gains are refused in the law's words."""
     found = measure_z_width(**SETTINGS)
     assert found["factors"] == [1.0, 2.0, 3.0]
@@ -54,7 +51,7 @@ def test_z_width_says_what_is_refused() -> None:
 
 
 @pytest.mark.usefixtures("short")
-def test_what_is_refused_depends_on_the_sensors(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_refused_depends_on_the_sensors(monkeypatch):
     """The paper's law takes 9000 N/m with exact and 7200 N/m with sampled positions (docs/limits.md)."""
     monkeypatch.setattr(coupled, "ASKED", (7000.0, 8000.0))
     settings = {**SETTINGS, "controller": "backstepping"}
@@ -64,7 +61,7 @@ def test_what_is_refused_depends_on_the_sensors(monkeypatch: pytest.MonkeyPatch)
     assert "allowed: at most 7200 N/m" in refused
 
 
-def test_stable_up_to_the_first_that_is_not() -> None:
+def test_stable_up_to_the_first_that_is_not():
     """From the softest that is not refused; nothing after the first miss counts."""
     piece = {
         "stable": [[None, True, True, False, True, None, None, None], [False] + [True] * 7],
@@ -73,7 +70,7 @@ def test_stable_up_to_the_first_that_is_not() -> None:
     assert stable_up_to(piece) == [coupled.ASKED[2], 0.0]
 
 
-def test_tables_say_lost_and_refused() -> None:
+def test_tables_say_lost_and_refused():
     run = {"controller": "mine", "sensors": "lab", "uses_force": False}
     pieces = [
         {"stiffness": 500.0, "refused": None, "mean": [1.0, 2.0, None], "most": [3.0, 4.0, None], "lost": [False, False, True]},
@@ -88,13 +85,13 @@ def test_tables_say_lost_and_refused() -> None:
     )
 
 
-def test_the_phase_is_shown_near_the_declared_one() -> None:
+def test_the_phase_is_shown_near_the_declared_one():
     """190 degrees beside 170, not -170."""
     felt, declared = np.exp(1j * np.radians([[190.0]])), np.exp(1j * np.radians([[174.0]]))
     np.testing.assert_allclose(phase(felt, declared), 190.0)
 
 
-def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost() -> None:
+def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost():
     """Three lanes of 10 N, of which one is lost, and one of 20 N: a spring of 1 and of 3 N/m, two frequencies."""
     springs, lines = np.array([1.0, 3.0, np.nan, 50.0]), [0.2, 1.0]
     piece = {
@@ -124,7 +121,7 @@ def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost() -> None:
 
 
 @pytest.mark.slow
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(tmp_path, monkeypatch, capsys):
     """Every subject on the nominal rig: strict JSON, tables, pictures; a controller that declares nothing has its errors."""
     monkeypatch.setattr(rendering, "STIFFNESSES", (2000.0,))
     monkeypatch.setattr(backdriving, "STIFFNESSES", (500.0, 0.0))

@@ -1,15 +1,12 @@
 """What laws declare is what they render: series, slow pushes on a rig without dry friction, and the rigid part of (18)."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from baselines.backstepping.impedance import joint_impedance
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
 from baselines.registry import LISTED, UNCONTROLLED, make_controller
-from birthsim_env.loop.signals import Reference
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env import Parameters, Reference
 from studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
 from studies.haptics.recording import record
 from studies.haptics.worlds import Condition, resting, uses_force
@@ -20,13 +17,13 @@ SLIDING = RIG.replace({f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)})
 POSES = [(0.5, 0.0), (0.4, 0.05)]
 
 
-def test_series_of_a_piston() -> None:
+def test_series_of_a_piston():
     """K + B s + M s^2 is the law's Z(s) up to the third order: an error 8 times smaller at half the s."""
     c, mass, viscous = (20.0, 30.0, 50.0), 4.0, 35.0
     m, b, k = joint_impedance(c, mass, viscous)
     a2, a1, a0 = 100.0, 20 * 30 + 20 * 50 + 30 * 50 + 2.0, 70.0 + 20 * 30 * 50
 
-    def missed(s: float) -> float:
+    def missed(s):
         exact = mass * (s**3 + a2 * s**2 + a1 * s + a0) / (s + a2 - viscous / mass)
         return abs(exact - (k + b * s + m * s * s))
 
@@ -34,7 +31,7 @@ def test_series_of_a_piston() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(LISTED)))
-def test_every_law_declares_the_stiffness_that_is_asked_for(name: str) -> None:
+def test_every_law_declares_the_stiffness_that_is_asked_for(name):
     """(18) loses nothing of a stiffness that is the same along x and y; mass and damping are positive definite."""
     declared = declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0]))
     assert declared is not None
@@ -45,11 +42,11 @@ def test_every_law_declares_the_stiffness_that_is_asked_for(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(UNCONTROLLED))
-def test_what_is_no_law_declares_nothing(name: str) -> None:
+def test_what_is_no_law_declares_nothing(name):
     assert declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0])) is None
 
 
-def test_a_coupled_stiffness_is_felt_along_the_push() -> None:
+def test_a_coupled_stiffness_is_felt_along_the_push():
     """The displacement along a push of a pure spring is u^T K^-1 u; roots of matrices are roots."""
     rows = resting([POSES[0]], [2000.0]).rows.copy()
     rows[9], rows[14] = 3000.0, 800.0
@@ -63,19 +60,13 @@ def test_a_coupled_stiffness_is_felt_along_the_push() -> None:
     np.testing.assert_allclose(declared.damping[..., 0] @ declared.damping[..., 0], (1.8**2) * 3.0 * k, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("name", "uses"),
-    [
-        ("backstepping", False),
-        ("backstepping-cartesian", False),
-        ("admittance-backstepping", True),
-        ("pid", True),
-        ("admittance-adaptive", True),
-        ("admittance-sensorless", False),
-    ],
-)
-def test_who_uses_the_force_of_the_hand(name: str, uses: bool) -> None:
-    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is uses
+USES = {"backstepping": False, "backstepping-cartesian": False, "admittance-sensorless": False}
+USES |= {"admittance-backstepping": True, "admittance-adaptive": True, "pid": True}
+
+
+@pytest.mark.parametrize("name", USES)
+def test_who_uses_the_force_of_the_hand(name):
+    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is USES[name]
     assert not uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=False))
 
 
@@ -84,7 +75,7 @@ def test_who_uses_the_force_of_the_hand(name: str, uses: bool) -> None:
     ("name", "options"),
     [("backstepping", {"weight_compensation": True}), ("backstepping-cartesian", {}), ("admittance-backstepping", {})],
 )
-def test_without_dry_friction_a_hand_feels_what_is_declared(name: str, options: dict[str, Any]) -> None:
+def test_without_dry_friction_a_hand_feels_what_is_declared(name, options):
     """Up to 2.2 Hz within 5 % and 5 degrees at 2000 N/m, two poses, along x and y: half the bandwidth's bounds.
 
     Valves of 4 ms, pressures that follow, and air that is not polytropic are what is left.
@@ -101,12 +92,12 @@ def test_without_dry_friction_a_hand_feels_what_is_declared(name: str, options: 
     assert np.abs(np.degrees(np.angle(ratio))).max() < 5
 
 
-def test_a_mass_of_the_hand_moves_with_the_rig_and_weighs_nothing() -> None:
+def test_a_mass_of_the_hand_moves_with_the_rig_and_weighs_nothing():
     """Valves shut: the energy given is that of port forces, and a rig starts at rest whatever the hand's mass."""
     law = make_controller("shut-valves", RIG)
     port = RigPort([RIG] * 2, resting([POSES[0]] * 2, [2000.0] * 2), law, hand_mass=np.array([0.0, 2.0]))
 
-    def hand(now: float, position: Any, velocity: Any) -> Any:
+    def hand(now, position, velocity):
         return np.repeat([[60.0], [0.0]], 2, axis=1) * (now > 0.05)
 
     recording = record(port, hand, 0.2)

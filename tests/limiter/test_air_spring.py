@@ -3,15 +3,33 @@
 import numpy as np
 import pytest
 
-from baselines.limiter.air_spring import MEMORY
+from baselines.limiter import air_spring
 from birthsim_env import Parameters
-from birthsim_env.loop.signals import Measurement
+from birthsim_env.loop.signals import InPlane, Joints
+from birthsim_env.physics.compiled.lanes import Rig, parameter_column
+from birthsim_env.physics.inverse_kinematics import pistons_at
 from studies.haptics.worlds import resting
 from studies.stability.rig_port import RigPort
-from tests.limiter.parts import AirSpring
+from tests.limiter.test_port_limiter import signals_of
 
 RIG = Parameters()
 PLACE = (0.5, 0.0)
+
+
+class AirSpring:
+    def __init__(self, rig, lanes, rate):
+        self.p, self.forces, self.rate = parameter_column(rig), np.full((4, lanes), np.nan), rate
+
+    def openings(self, measurement, reference):
+        opening, joints = np.empty_like(self.forces), []
+        for place in (measurement.position, reference.position):
+            joints.append(Joints(np.empty((Joints.size, place.shape[1]))))
+            pistons_at(np.concatenate([place, np.zeros_like(place)]), Rig(self.p), joints[-1].rows)
+        seen = signals_of(measurement, reference)
+        for lane in range(opening.shape[1]):
+            hand = InPlane(seen.user_force.copy())
+            air_spring.passive_openings(self.forces, self.rate, seen.pressure, hand, *joints, seen, Rig(self.p), opening, lane)
+        return opening
 
 
 class Passive:
@@ -24,8 +42,8 @@ class Passive:
     def reset(self, lanes=None):
         self.air = None
 
-    def command(self, measurement: Measurement, reference):
-        self.air = self.air or AirSpring(RIG, measurement.position.shape[1], 0.001 / MEMORY)
+    def command(self, measurement, reference):
+        self.air = self.air or AirSpring(RIG, measurement.position.shape[1], 0.001 / air_spring.MEMORY)
         openings = self.air.openings(measurement, reference)
         kicked = (measurement.time >= 0.5) & (measurement.time < 0.53)
         return np.where(kicked, np.reshape(self.kick, (4, 1)), openings)

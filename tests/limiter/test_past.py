@@ -3,9 +3,23 @@
 import numpy as np
 import pytest
 
-from tests.limiter.parts import Past
+from baselines.limiter.past import recall, slots_of
 
 T = 0.001
+
+
+class Past:
+    """``rows`` signals of ``lanes``, once per period."""
+
+    def __init__(self, period, rows, lanes):
+        self.period, self.slots = period, slots_of(period)
+        self.kept, self.newest = np.full((self.slots * rows, lanes), np.nan), np.zeros(lanes)
+
+    def at(self, late, signals):
+        told = np.empty_like(signals)
+        for lane, periods in enumerate(late / self.period):
+            recall(self.kept, self.newest, self.slots, periods, signals, told, lane)
+        return told
 
 
 def test_a_ramp_is_known_at_any_time_before():

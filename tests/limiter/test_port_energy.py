@@ -5,11 +5,21 @@ import math
 import numpy as np
 import pytest
 
-from baselines.limiter.port_energy import LAG
-from tests.limiter.parts import PortEnergy
-from tests.limiter.test_port_limiter import T, seen, targets
+from baselines.limiter.port_energy import LAG, Energy, Work, count_work
+from tests.limiter.test_port_limiter import T, seen, signals_of, targets
 
 CYCLES, W, SIZE, FORCE = 20, 2 * math.pi * 5.0, 0.004, 20.0
+
+
+class PortEnergy:
+    def __init__(self, lanes):
+        self.own, self.work = Energy(np.zeros((Energy.size, lanes))), Work(np.zeros((Work.size, lanes)))
+        self.own.stamp[:] = -np.inf
+
+    def update(self, measurement, reference, force):
+        for lane in range(force.shape[1]):
+            count_work(self.own, signals_of(measurement, reference), force, self.work, lane)
+        return self.work
 
 
 def counted(phase, size=SIZE):

@@ -9,8 +9,8 @@ import pytest
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import bare_name, known_options, make_controller
 from baselines.staged import CompiledDriving, Driving, driving
-from birthsim_env import Parameters
-from birthsim_env.loop.signals import Measurement
+from birthsim_env import Measurement, Parameters
+from birthsim_env.loop.rows import Signals, fill_measurement
 from studies.haptics.worlds import resting
 from studies.stability.maps import Cases, judge
 
@@ -38,6 +38,13 @@ def seen(time, position, velocity, force, late=0.0):
         clock, place, clock - late, np.array([np.ones(lanes) * velocity, zero]), np.full((4, lanes), 4e5),
         np.array([np.ones(lanes) * force, zero]), late > 0,
     )  # fmt: skip
+
+
+def signals_of(measurement, reference):
+    seen = Signals(np.zeros((Signals.size, measurement.position.shape[1])))
+    fill_measurement(seen.rows, measurement)
+    seen.reference.rows[:] = reference.rows
+    return seen
 
 
 def targets(lanes=1):

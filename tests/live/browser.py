@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
@@ -14,20 +15,9 @@ from tests.console import ROOT
 
 NAMES = (
     *("chromium", "chromium-browser", "chromium-headless-shell", "headless_shell", "chrome-headless-shell"),
-    *("google-chrome", "google-chrome-stable", "google-chrome-beta", "google-chrome-unstable", "chrome"),
-    *("microsoft-edge", "microsoft-edge-stable", "msedge", "brave-browser", "brave"),
-    *("Chromium", "Google Chrome", "Google Chrome Canary", "Microsoft Edge", "Brave Browser"),  # macOS
+    *("google-chrome", "google-chrome-stable", "chrome", "microsoft-edge", "msedge", "brave-browser"),
 )
-PLACES = (
-    *("/usr/bin", "/usr/local/bin", "/snap/bin", "/usr/lib/chromium", "/usr/lib/chromium-browser"),
-    *("/opt/google/chrome", "/opt/microsoft/msedge", "/opt/brave.com/brave", "/opt/homebrew/bin"),
-    *(f"/Applications/{name}.app/Contents/MacOS" for name in NAMES[-5:]),
-    *(
-        f"{os.environ.get(root, '')}/{name}/Application"
-        for root in ("PROGRAMFILES", "PROGRAMFILES(X86)", "LOCALAPPDATA")
-        for name in ("Google/Chrome", "Chromium", "Microsoft/Edge", "BraveSoftware/Brave-Browser")
-    ),
-)
+"""Programs that are looked for; Playwright knows its own browser, and BIRTHSIM_CHROMIUM says where another one is."""
 OF_PLAYWRIGHT = """
 from playwright.sync_api import sync_playwright
 with sync_playwright() as playwright:
@@ -51,9 +41,7 @@ def find_chromium():
         if found := shutil.which(chosen):
             return found
         raise ValueError(f"BIRTHSIM_CHROMIUM = {chosen!r} is no program; allowed: the path of a Chromium, or not set")
-    search = os.pathsep.join([os.environ.get("PATH", ""), *PLACES])
-    installed = (path for name in NAMES if (path := shutil.which(name, path=search)))
-    return next(installed, None) or _of_playwright()
+    return next(filter(None, map(shutil.which, NAMES)), None) or _of_playwright()
 
 
 def _of_playwright():
@@ -113,27 +101,13 @@ class Server:
                 process.kill()
 
 
-class Folder:
-    """A server of the files in a folder, as ``python -m http.server``, at ``url``."""
-
-    def __init__(self, folder):
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
-        self.url = f"http://127.0.0.1:{self._server.server_port}/"
-
-    def __enter__(self):
-        threading.Thread(target=self._server.serve_forever, daemon=True).start()
-        return self
-
-    def __exit__(self, *_):
-        self._server.shutdown()
-        self._server.server_close()
-
-
-class Quiet(SimpleHTTPRequestHandler):
-    """Says nothing of what it is asked."""
-
-    def log_message(self, *_):
-        pass
+@contextmanager
+def served(folder):
+    """The address of a server of the files in a folder."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(folder))) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
 
 
 def launch(playwright):

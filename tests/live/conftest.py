@@ -2,7 +2,17 @@
 
 import pytest
 
+from birthsim_env import Parameters
+from birthsim_live.rig.folder import packed_page, write_page
 from tests.live.browser import CALM, Server, Window
+
+
+@pytest.fixture(scope="session")
+def page(tmp_path_factory):
+    """A folder with the page."""
+    folder = tmp_path_factory.mktemp("worker") / "page"
+    write_page(folder, packed_page(Parameters()))
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -19,9 +19,9 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it(tmp_path, mo
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    monkeypatch.setattr(browser, "PLACES", (str(tmp_path),))
     assert browser.missing() == LACK
-    (tmp_path / "chromium").touch(0o755)
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "chromium").touch(0o755)
     assert browser.missing() == ""
     monkeypatch.setenv("BIRTHSIM_CHROMIUM", str(tmp_path / "none"))
     with pytest.raises(ValueError, match=r"BIRTHSIM_CHROMIUM = '.*none' is no program; allowed: the path of a Chromium"):

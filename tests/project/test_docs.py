@@ -219,9 +219,9 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
 def test_axe_finds_nothing_on_the_site(site, page_of, theme):
     page = page_of("")
     page.emulate_media(color_scheme=theme)
-    with browser.Folder(site) as served:
+    with browser.served(site) as url:
         for name in ("index", "tutorials/first_episode", "comparison", "reference/environments", "reference/commands"):
-            page.goto(f"{served.url}{name}.html")
+            page.goto(f"{url}{name}.html")
             assert axe.violations(page, "iframe") == [], name
 
 
@@ -229,9 +229,9 @@ def test_axe_finds_nothing_on_the_site(site, page_of, theme):
 @axe.NEEDED
 def test_equations_are_drawn_from_a_file_of_the_site(site, page_of):
     page, drawn = page_of(""), "mjx-container:not(:has([data-mml-node=merror]))"
-    with browser.Folder(site) as served:
+    with browser.served(site) as url:
         for name in ("explanation/equations", "explanation/hand", "live"):
-            page.goto(f"{served.url}{name}.html")
+            page.goto(f"{url}{name}.html")
             written = page.locator(".math").count()
             assert written > 0, name
             page.wait_for_function(f"document.querySelectorAll('mjx-container').length == {written}")

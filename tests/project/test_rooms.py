@@ -37,7 +37,7 @@ def test_no_module_gives_a_name_twice():
     twice = []
     for package in ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live"):
         for path in (ROOT / package).rglob("*.py"):
-            named: set[str] = set()
+            named = set()
             for node in ast.parse(path.read_text(encoding="utf-8")).body:
                 targets = [] if isinstance(node, ast.For) else getattr(node, "targets", [getattr(node, "target", node)])
                 parts = [part for target in targets for part in getattr(target, "elts", [target])]

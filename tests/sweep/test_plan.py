@@ -75,55 +75,6 @@ def test_a_file_without_tables_is_one_point(sweep):
     assert sweep("").points == [{}]
 
 
-SPAN = "{from = 1, to = 2, count = 2, log = 'no'}"
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "allowed"),
-    [
-        ("[gird]\nsensors = ['lab']", "'gird'", "[base], [grid], [draw], [search] and [[map]]"),
-        ("[base]\ncolour = 'red'", "'colour'", "environment, controller, "),
-        ("[grid]\nsensors = 'lab'", "[grid] sensors = 'lab'", "a list of values, or "),
-        ("[grid]\n'gain.bandwidth' = {from = 3, to = 2, count = 2}", "", "from below to"),
-        ("[grid]\n'gain.bandwidth' = {from = 1, to = 2}", "count = None", "a whole number from 2"),
-        ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 2, step = 1}", "", "{ from, to, count, log }"),
-        ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 4000000000}", "count", ""),
-        ("[draw]\nsensors = ['lab']", "[draw] count = None", "a whole number from 1"),
-        ("[draw]\ncount = 2000000\nsensors = ['lab']", "makes 2000000 points", "at most 1000000"),
-        ("[base]\nepisodes = 0", "[base] episodes = 0", "a whole number from 1"),
-        ("[search]\ntrials = 3", "[search] has no ranges", "names with"),
-        ("[search]\n'gain.bandwidth' = [1, 2]", "[search] gain.bandwidth = [1, 2]", "{ from, to, log }"),
-        ("[grid]\nsensors = ['lab']\n[[map]]\nx = 'sensors'", "[[map]]", "x, y and perhaps"),
-        ("[[map]]\nx = 'sensors'\ny = 'policy'", "x = 'sensors'", "what varies"),
-        ("[base]\npolicy = ''", "policy", "a word"),
-        ("[grid]\ncontroller = [1, 'pid']", "controller = 1", "a word"),
-        ("[draw]\ncount = 1\nenvironment = [2000-01-01]", "environment", "a word"),
-        ("[base]\nsensors = 'perfect'", "sensors", "'lab'"),
-        ("[grid]\nrandomize = ['no']", "randomize", "True"),
-        ("[grid]\nsensors = {from = 1, to = 2, count = 2}", "sensors", "a list of values"),
-        ("[search]\nreference = {from = 1, to = 2}", "reference", "from, to, log"),
-        ("[grid]\n'gain.bandwidth' = [[1]]", "gain.bandwidth", "a number"),
-        (f"[grid]\n'gain.bandwidth' = {SPAN}", "gain.bandwidth log", "true, false"),
-        ("[search]\ntrials = 2000000\n'gain.bandwidth' = {from = 1, to = 2}", "trials", "1000000"),
-        ("[search]\nmetric = 'best'\n'gain.bandwidth' = {from = 1, to = 2}", "metric", "settled_rms"),
-        ("[[map]]\nx = ['a']\ny = {}", "x", "what varies"),
-        ("[grid]\nsensors = ['lab']\n[[map]]\nx = 'sensors'\ny = 'sensors'\nstatistic = []", "statistic", "'median'"),
-        ("[base]\n'training.seed' = 1", "training.seed", "train"),
-        ("[base]\ntrain = 'circle'\n[grid]\n'training.stepz' = [1]", "training.stepz", "steps"),
-        ("[base]\ntrain = 'circle'\n[grid]\ncontroller = ['pid']", "controller", "without it"),
-        ("[base]\npolicy = 'circle'\n[grid]\ncontroller = ['pid']", "controller", "'residual'"),
-        ("[base]\nsensors = 'lab'\n[draw]\ncount = 1\nsensors = ['ideal']", "sensors", "once"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_is_refused_by_name_with_what_is_allowed(sweep, text, name, allowed):
-    with pytest.raises(ValueError, match=r"sweep\.toml") as refusal:
-        sweep(text)
-    said = str(refusal.value)
-    assert name in said
-    assert allowed in said.partition("allowed")[2]
-    assert "\n" not in said
-
-
 def test_layers_of_a_trained_network_may_be_set(sweep):
     base = sweep("[base]\ntrain = 'circle_quick'\n'training.hidden' = [8, 16]").base
     assert override(TrainingSettings(), hidden=base["training.hidden"]).hidden == (8, 16)

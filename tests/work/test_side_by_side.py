@@ -83,7 +83,7 @@ def test_workers_end_with_their_parent_whatever_ends_it(ending, tmp_path):
     waited_for(lambda: not any(is_running(worker) for worker in workers))
 
 
-def is_running(process: int) -> bool:
+def is_running(process):
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -2,10 +2,9 @@
 
 import gymnasium
 
+from birthsim_env import Path, StiffnessSchedule
 from birthsim_env.parts.hands.user_forces import Ramp
-from birthsim_env.parts.references import Path
 from birthsim_env.parts.scenarios import SCENARIOS, Scenario
-from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 
 
 def parts():

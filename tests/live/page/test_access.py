@@ -138,12 +138,6 @@ def test_frames_without_numbers_are_shown_as_such(window, tmp_path):
         window.wait(f"document.querySelector('[data-figure=displacement] dd').textContent.startsWith('{shown}')")
 
 
-def test_every_choice_is_offered(window):
-    for name in ("scenario", "controller", "valves", "sensors"):
-        offered = window.value(f"document.querySelector('select[name={name}]').options.length")
-        assert offered == window.value(f"birthsim.hello.choices.{name}.length")
-
-
 def test_on_a_phone_a_finger_drags_the_head_and_the_lab_below_it(chromium, server):
     with Window(chromium, server.url, NARROW, touch=True) as window:
         session = window.context.new_cdp_session(window.page)

@@ -1,7 +1,5 @@
 """A controller of one's own under the page: Python commands, the browser's rig waits, and what goes wrong is shown."""
 
-from pathlib import Path
-
 import pytest
 
 from tests.live.browser import Server, Window
@@ -11,8 +9,8 @@ LOST = "document.querySelector('#lost').textContent"
 
 
 @pytest.fixture(scope="module")
-def mine(tmp_path_factory) -> Path:
-    path: Path = tmp_path_factory.mktemp("own") / "mine.py"
+def mine(tmp_path_factory):
+    path = tmp_path_factory.mktemp("own") / "mine.py"
     path.write_text(OWN, encoding="utf-8")
     return path
 

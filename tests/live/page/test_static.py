@@ -1,16 +1,15 @@
 """The page as a folder of files: any server shows it below any address, and it records and replays by itself."""
 
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from agents.policy import seeds
-from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import COLUMNS, load_recording
-from birthsim_live.rig.folder import packed_page, write_page
 from tests.console import run as command
-from tests.live.browser import CALM, Folder, Window
+from tests.live.browser import CALM, Window, served
 from tests.live.rig.worker import run
 
 pytestmark = pytest.mark.slow
@@ -29,30 +28,29 @@ def built(tmp_path_factory):
 @pytest.fixture(scope="module")
 def server(built):
     """Of files, which has the page below another folder."""
-    with Folder(built.parent) as served:
-        served.url += f"{built.name}/"
-        yield served
+    with served(built.parent) as url:
+        yield SimpleNamespace(url=f"{url}{built.name}/")
 
 
 @pytest.mark.parametrize("compare", ["nothing", "backstepping"])
-def test_a_recorded_episode_has_the_bits_of_the_loop(window, tmp_path, compare):
-    page = window.page
+def test_a_recorded_episode_has_the_bits_of_the_loop(window, page, tmp_path, compare):
+    tab = window.page
     window.choose(compare=compare, scenario="circle")
-    page.locator("input[name=scenario_force]").check()
+    tab.locator("input[name=scenario_force]").check()
     window.wait("birthsim.settings.scenario_force")
     window.live(0.3)
-    page.locator("#record").click()
+    tab.locator("#record").click()
     window.wait("birthsim.state.recording !== null")
-    page.locator("#pause").click()
+    tab.locator("#pause").click()
     window.wait("birthsim.state.paused")
-    page.locator("#reset").click()
+    tab.locator("#reset").click()
     window.wait("birthsim.frame.time === 0")  # paused, it stays there
-    page.locator("#pause").click()
+    tab.locator("#pause").click()
     window.wait("birthsim.frame.time > 1.5")
-    page.locator("#record").click()
+    tab.locator("#record").click()
     window.wait("birthsim.state.recording === null && birthsim.state.last_recording !== null")
-    with page.expect_download() as download:
-        page.locator("#download").click()
+    with tab.expect_download() as download:
+        tab.locator("#download").click()
     download.value.save_as(tmp_path / "circle.rec")
     window.play(tmp_path / "circle.rec")
     window.wait("birthsim.state.file === 'circle.rec' && birthsim.frame.time > 0")
@@ -63,8 +61,7 @@ def test_a_recorded_episode_has_the_bits_of_the_loop(window, tmp_path, compare):
     assert len(rows) > 300
     instants = np.round(rows[:, 0] / 0.001).astype(int)
     settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2], "compare": compare}
-    write_page(tmp_path / "page", packed_page(Parameters()))
-    told = run(tmp_path / "page", [("set", settings), ("reset", None), ("advance", int(instants[-1]))])[0][-1]
+    told = run(page, [("set", settings), ("reset", None), ("advance", int(instants[-1]))])[0][-1]
     expected = np.hstack([told.row, told.second_row]) if compare != "nothing" else told.row
     moved = instants > 0
     found, wanted = rows[moved, : expected.shape[1]], expected[instants[moved] - 1]
@@ -82,9 +79,9 @@ def test_a_policy_of_ones_own_opens_the_page(chromium, server):
 def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
     folder = shutil.copytree(built, tmp_path / "page")
     (folder / "rig" / "loop.wasm").unlink()
-    with Folder(folder) as served:
+    with served(folder) as url:
         page = chromium.new_page()
-        page.goto(served.url)
+        page.goto(url)
         page.locator("#offline", has_text="loop.wasm is missing (404)").wait_for()
         page.close()
 
@@ -100,8 +97,8 @@ def test_in_a_long_page_only_a_rig_in_sight_runs(chromium, built):
     frame = f'<iframe src="{built.name}/index.html?embed=1" width="700" height="430"></iframe>'
     (built.parent / "long.html").write_text(f'<!doctype html>{frame}<div style="height: 5000px"></div>')
     page = chromium.new_page()
-    with Folder(built.parent) as served:
-        page.goto(f"{served.url}long.html")
+    with served(built.parent) as url:
+        page.goto(f"{url}long.html")
         (inner,) = page.frames[1:]
 
         def becomes(paused):

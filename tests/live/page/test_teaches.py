@@ -101,9 +101,11 @@ def test_every_name_explains_itself(window):
         assert not explanation.is_visible()
 
 
-def test_a_choice_says_what_it_is_where_it_is_made(window):
+def test_every_choice_is_offered_and_says_what_it_is(window):
     said = window.page.locator("#chosen")
     for name in ("scenario", "controller", "valves", "sensors"):
+        offered = window.value(f"document.querySelector('select[name={name}]').options.length")
+        assert offered == window.value(f"birthsim.hello.choices.{name}.length")
         window.page.locator(f"select[name={name}]").focus()
         about = f"birthsim.hello.choices.{name}.find((one) => one.name === birthsim.settings.{name}).about"
         assert said.text_content() == window.value(about) != ""

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -10,7 +9,6 @@ import pytest
 
 from baselines.bench import pieces
 from baselines.logs import writing
-from baselines.logs.log import Log
 from baselines.work import tasks
 from birthsim_env.files import write_json
 from birthsim_env.physics.rig.parameters import Parameters
@@ -25,7 +23,7 @@ HEAD = ["topic", "log_time"]
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def files(tmp_path_factory):
     """A recording with a pointer that comes, and a second rig; an evaluation of two laws; one of its pieces."""
     folder, rig = tmp_path_factory.mktemp("logs"), Parameters()
     write_recording(folder / "one.rec", example(40, second=True))
@@ -41,19 +39,19 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {"recording": folder / "one.rec", "evaluation": folder / "evaluation.json", "piece": folder / "pid.json"}
 
 
-def bits(values: object) -> bytes:
+def bits(values):
     """Numbers to the last bit, all kinds of NaN as one."""
     numbers = np.asarray(values)
     return np.where(numbers == numbers, numbers, np.nan).tobytes() if numbers.dtype.kind == "f" else numbers.tobytes()
 
 
-def rows_of(log: Log, name: str) -> np.ndarray:
+def rows_of(log, name):
     return np.concatenate([one.values[name] for one in log.series])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
-def test_parquet_gives_every_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
+def test_parquet_gives_every_number_back(kind, files, tmp_path, monkeypatch, capsys):
     out = tmp_path / "a.parquet"
     status, printed, complained = call("export", monkeypatch, capsys, "--to", "parquet", files[kind], "--out", out)
     assert (status, complained) == (0, "")
@@ -72,11 +70,11 @@ def test_parquet_gives_every_number_back(kind: str, files: dict[str, Path], tmp_
 
 
 @pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
-def test_mcap_gives_every_finite_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
+def test_mcap_gives_every_finite_number_back(kind, files, tmp_path, monkeypatch, capsys):
     reader = pytest.importorskip("mcap.reader", reason=MISSING)
     assert call("export", monkeypatch, capsys, "--to", "mcap", files[kind], "--out", tmp_path / "a.mcap")[0] == 0
     log = reading.read_log(files[kind])
-    messages: dict[str, list[tuple[int, dict]]] = {}
+    messages = {}
     with (tmp_path / "a.mcap").open("rb") as file:
         mcap = reader.make_reader(file, validate_crcs=True)
         for schema, channel, message in mcap.iter_messages():
@@ -102,7 +100,7 @@ def test_mcap_gives_every_finite_number_back(kind: str, files: dict[str, Path], 
     assert sorted(events, key=str) == sorted(expected, key=str)
 
 
-def test_a_log_holds_what_the_file_holds(files: dict[str, Path]) -> None:
+def test_a_log_holds_what_the_file_holds(files):
     recording, log = load_recording(files["recording"]), reading.read_log(files["recording"])
     assert {name: len(ends) for name, (_, _, ends) in reading.FIELDS.items()} == recordings.FIELDS
     assert bits(np.array([log.series[0].values[name] for name in log.columns]).T) == bits(recording.rows)
@@ -124,7 +122,7 @@ def test_a_log_holds_what_the_file_holds(files: dict[str, Path]) -> None:
     assert log.series[0].times[1] == pytest.approx(0.01)
 
 
-def test_results_that_do_not_fit_together_are_refused(files: dict[str, Path], tmp_path: Path) -> None:
+def test_results_that_do_not_fit_together_are_refused(files, tmp_path):
     content = json.loads(files["evaluation"].read_text())
     content["results"][0]["lost"].pop()
     write_json(tmp_path / "short.json", content)
@@ -133,12 +131,12 @@ def test_results_that_do_not_fit_together_are_refused(files: dict[str, Path], tm
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
-def test_a_log_is_written_whole_or_not_at_all(suffix: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
+def test_a_log_is_written_whole_or_not_at_all(suffix, files, tmp_path, monkeypatch, capsys):
     """A writer that fails half way leaves the file that was there."""
     path = tmp_path / f"a{suffix}"
     path.write_bytes(b"before")
 
-    def half(log: Log, file) -> None:
+    def half(log, file):
         file.write(b"half")
         raise OSError(28, "No space left on device")
 
@@ -151,7 +149,7 @@ def test_a_log_is_written_whole_or_not_at_all(suffix: str, files: dict[str, Path
 
 
 @pytest.mark.parametrize(("suffix", "package"), [(".parquet", "pyarrow"), (".mcap", "mcap.writer")])
-def test_without_the_extra_it_says_how_to_get_it(suffix, package, files, tmp_path, monkeypatch, capsys) -> None:
+def test_without_the_extra_it_says_how_to_get_it(suffix, package, files, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, package, None)
     line = ("--to", suffix[1:], files["recording"], "--out", tmp_path / f"a{suffix}")
     status, _, complained = call("export", monkeypatch, capsys, *line)

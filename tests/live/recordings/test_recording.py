@@ -1,8 +1,5 @@
 """Recordings: what is read is what was written, and what is no recording is refused by name."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -15,12 +12,12 @@ RIG = Parameters().replace({"mechanics.mass": 2.5})
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def file(tmp_path_factory):
     return write_recording(tmp_path_factory.mktemp("recordings") / "one.rec", example(36), RIG)
 
 
 @pytest.mark.parametrize("second", [False, True])
-def test_what_is_read_is_what_was_written(second: bool, tmp_path: Path) -> None:
+def test_what_is_read_is_what_was_written(second, tmp_path):
     rows = example(36, second)
     found = load_recording(write_recording(tmp_path / "one.rec", rows, RIG))
     assert found.rig == RIG
@@ -31,7 +28,7 @@ def test_what_is_read_is_what_was_written(second: bool, tmp_path: Path) -> None:
     assert found.events == events_of(36)
 
 
-def test_a_file_from_before_friction_and_flows_is_read_without_them(tmp_path: Path) -> None:
+def test_a_file_from_before_friction_and_flows_is_read_without_them(tmp_path):
     rows = np.random.default_rng(0).uniform(-0.05, 0.05, (3, COLUMNS - 6))
     header = {**header_of(RIG), "format": "birthsim-recording-2", "columns": list(FIELDS)[:-2]}
     (tmp_path / "old.rec").write_bytes(packed(header) + packed({"events": []}, rows))
@@ -40,14 +37,14 @@ def test_a_file_from_before_friction_and_flows_is_read_without_them(tmp_path: Pa
     assert np.isnan(found.rows[:, -6:]).all()
 
 
-def test_a_file_that_ends_early_is_read_as_far_as_it_goes(file: Path, tmp_path: Path) -> None:
+def test_a_file_that_ends_early_is_read_as_far_as_it_goes(file, tmp_path):
     """As a kill may leave it: a part of a chunk."""
     for cut in (1, 7, 9, 30):
         (tmp_path / "torn.rec").write_bytes(file.read_bytes() + packed({"events": []}, np.ones((9, 2 * COLUMNS)))[:cut])
         assert len(load_recording(tmp_path / "torn.rec").rows) == 36
 
 
-def rewritten(path: Path, folder: Path, change: Any) -> Path:
+def rewritten(path, folder, change):
     """A copy of a recording, of two chunks, whose header, events and rows ``change`` has seen."""
     whole = load_recording(path)
     parts = {"header": header_of(whole.rig), "events": whole.events, "rows": np.hstack([whole.rows, whole.second])}
@@ -57,11 +54,11 @@ def rewritten(path: Path, folder: Path, change: Any) -> Path:
     return copy
 
 
-def put(**values: Any) -> Any:
+def put(**values):
     return lambda parts: parts["header"].update(values)
 
 
-def events(*listed: Any) -> Any:
+def events(*listed):
     return lambda parts: parts.update(events=list(listed))
 
 
@@ -85,24 +82,22 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_what_is_foreign_is_refused_by_name(damage: str, file: Path, tmp_path: Path) -> None:
+def test_what_is_foreign_is_refused_by_name(damage, file, tmp_path):
     copy = rewritten(file, tmp_path, DAMAGES[damage])
     with pytest.raises(ValueError, match=r"changed.rec' is damaged or foreign .*; allowed: what birthsim live wrote"):
         load_recording(copy)
 
 
-def test_what_is_damaged_is_refused_by_name(file: Path, tmp_path: Path) -> None:
+def test_what_is_damaged_is_refused_by_name(file, tmp_path):
     whole = file.read_bytes()
     broken = tmp_path / "broken.rec"
     for content in (b"", b"hello", whole[:100], whole[:200] + bytes(300) + whole[500:], whole + whole[:300] + whole):
         broken.write_bytes(content)
         with pytest.raises(ValueError, match=r"broken.rec' is damaged or foreign"):
             load_recording(broken)
-    with pytest.raises(ValueError, match=r"none.rec' cannot be read: No such file"):
-        load_recording(tmp_path / "none.rec")
 
 
-def test_a_file_that_holds_too_much_is_not_unpacked(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_holds_too_much_is_not_unpacked(file, monkeypatch):
     size = file.stat().st_size
     for most, words in ((size, f"allowed: up to {size}"), (size - 1, f"allowed: at most {size - 1}")):
         monkeypatch.setattr(recording, "LARGEST", most)
@@ -118,7 +113,7 @@ LONG = [
 
 
 @pytest.mark.parametrize(("limit", "most", "content"), LONG)
-def test_json_that_would_take_long_is_refused_before_it_is_read(limit, most, content, file, tmp_path, monkeypatch) -> None:
+def test_json_that_would_take_long_is_refused_before_it_is_read(limit, most, content, file, tmp_path, monkeypatch):
     (tmp_path / "long.rec").write_bytes(file.read_bytes() + content + packed({"events": [3]}))
     assert len(load_recording(file).rows) > 1
     monkeypatch.setattr(recording, limit, most)

@@ -7,24 +7,23 @@ from birthsim_build.stages import enter_scenario, outside
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage
-from birthsim_env.parts.references import Trajectory
 
 
 class Course:
     """A target: a trajectory, or after ``follow`` another one."""
 
-    def __init__(self, trajectory: Trajectory) -> None:
+    def __init__(self, trajectory):
         self.world, self.seen = World(np.zeros((World.size, 1))), Seen(np.zeros((Seen.size, 1)))
         self.inputs = Inputs(FIRST[:, None].copy())
         self._put(trajectory)
 
-    def sample(self, now: float) -> np.ndarray:
+    def sample(self, now):
         """The target and its derivatives, (8,), at ``now``, s."""
         self.seen.time[:] = now
         self._loop.run()
         return self.seen.reference.rows[:8, 0].copy()
 
-    def follow(self, trajectory: Trajectory, now: float) -> None:
+    def follow(self, trajectory, now):
         """From ``now``, s, on another trajectory."""
         self.sample(now)
         self._put(trajectory)
@@ -33,7 +32,7 @@ class Course:
         self.sample(now)
         assert np.array_equal(self.seen.reference.rows, before)
 
-    def _put(self, trajectory: Trajectory) -> None:
+    def _put(self, trajectory):
         trajectory.prepare(1)
         trajectory.begin(0, np.random.default_rng(0))
         enter, leave = (Stage(one, memory=self.inputs.rows) for one in (enter_scenario, outside))

@@ -60,22 +60,6 @@ class Hand(UserForce):
         return forces
 
 
-class Chosen(StiffnessSchedule):
-    """Setpoints of the sliders."""
-
-    def __init__(self, kclx):
-        self._rows = np.array([kclx, 2000.0, 4600.0, 2300.0, 0.0, 0.0, 0.0])[:, None]
-
-    def prepare(self, num_envs):
-        pass
-
-    def begin(self, lane, rng):
-        pass
-
-    def sample(self, time):
-        return np.repeat(self._rows, len(time), axis=1)
-
-
 def expected(controller, settings, hold, rig):
     """What Gymnasium's environment does under such settings and such a hand."""
     scenario, friction = settings.get("scenario", "probe"), settings.get("friction", 1.0)
@@ -86,7 +70,13 @@ def expected(controller, settings, hold, rig):
     world = {"rig": rig, "parameters": rig.replace(changes), "valves": settings.get("valves", "two_valves")}
     world["user_force"] = Hand(scenario, settings.get("scenario_force", False), **hold)
     if "Kclx" in settings:
-        world["stiffness"] = Chosen(settings["Kclx"])
+        sliders = {
+            "closed_loop": (settings["Kclx"],),
+            "closed_loop_y": (2000.0,),
+            "pneumatic1": (4600.0,),
+            "pneumatic2": (2300.0,),
+        }
+        world["stiffness"] = StiffnessSchedule(**sliders)
     return loop_rows(scenario, settings.get("sensors", "ideal"), controller, PERIODS, **world)[:, ROWS]
 
 

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from birthsim_build.stages import LEAST_TIME, PACE
-from birthsim_env.parts.references import Circle, Hold
+from birthsim_env import Circle, Hold, Parameters
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.rig.parameters import Parameters
 from tests.live.rig.course import Course
 
 
-def test_a_bridge_meets_both_ends_and_its_derivatives_are_true() -> None:
+def test_a_bridge_meets_both_ends_and_its_derivatives_are_true():
     """The second of two, while the first is under way; that nothing jumps where one begins, ``follow`` checks."""
     course, there, begins = Course(Circle()), np.array([0.42, 0.03]), 0.8
     course.follow(Circle(radius=0.06), 0.6)
@@ -32,7 +31,7 @@ def test_a_bridge_meets_both_ends_and_its_derivatives_are_true() -> None:
 
 
 @pytest.mark.parametrize(("first", "second"), list(permutations(SCENARIOS, 2)))
-def test_bridges_between_scenarios_stay_in_the_workspace(first: str, second: str) -> None:
+def test_bridges_between_scenarios_stay_in_the_workspace(first, second):
     for now in (0.7, 2.9):
         course = Course(SCENARIOS[first].nominal()[0])
         course.follow(SCENARIOS[second].nominal()[0], now)

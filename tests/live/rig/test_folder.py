@@ -1,13 +1,11 @@
 """A policy of one's own, another rig, and a rig that the page cannot show: ``birthsim live``."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from agents.policy.controller import ResidualController
-from agents.policy.files import load_policy
+from agents import ResidualController, load_policy
 from agents.policy.seeds import SHIPPED, best_policy
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import packed_page, write_page
@@ -18,12 +16,12 @@ RIG = Parameters()
 
 
 @pytest.fixture
-def mine(tmp_path: Path) -> str:
+def mine(tmp_path):
     """A folder as birthsim train leaves it."""
     return str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
 
 
-def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine: str, tmp_path: Path) -> None:
+def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine, tmp_path):
     rig = RIG.replace({"mechanics.mass": 2.5, "cylinder1.coulomb_friction": 9.0})
     packed = packed_page(rig, [mine, "forceps"])
     listed = packed.content["hello"]["choices"]["controller"]
@@ -41,7 +39,7 @@ def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine: str, tmp_path: Pa
     assert np.isfinite(end.of("position")).all()
 
 
-def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
+def test_a_policy_that_remembers_has_a_memory_in_the_page():
     name = "circle_honest_student"
     memory = controller_parts(ResidualController(RIG, name))["sampled"]["policy"].stages[-1].memory
     cells = load_policy(best_policy(name)).network.cells
@@ -49,7 +47,7 @@ def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
     np.testing.assert_array_equal(memory[:, 0], np.zeros(1 + cells))
 
 
-def test_a_scenario_that_a_rig_cannot_do_is_no_choice() -> None:
+def test_a_scenario_that_a_rig_cannot_do_is_no_choice():
     rig = RIG.replace({"cylinder2.stroke": 0.04})
     choices = {one["name"]: one for one in packed_page(rig).content["hello"]["choices"]["scenario"]}
     assert "missing" not in choices["probe"]
@@ -57,7 +55,7 @@ def test_a_scenario_that_a_rig_cannot_do_is_no_choice() -> None:
     assert "unreachable" in choices["circle"]["about"]
 
 
-def test_a_controller_with_options_is_compiled_too() -> None:
+def test_a_controller_with_options_is_compiled_too():
     names = ["pid[bandwidth=30]", "admittance", "limited:pid", "nobody"]
     content = packed_page(RIG, [], names).content
     listed = [one["name"] for one in content["hello"]["choices"]["controller"]]

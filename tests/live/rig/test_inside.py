@@ -3,17 +3,16 @@
 import numpy as np
 import pytest
 
+from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled import lanes
 from birthsim_env.physics.geometry import amplification
-from birthsim_env.physics.plant import Plant
-from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.stages import INSIDE, look_inside
 
 FRICTION = [getattr(lanes, name) for name in ("FC1", "FC2", "FS1", "FS2", "FV1", "FV2", "BRISTLE_S0", "BRISTLE_S1")]
 TEMPERATURES = [lanes.TP1, lanes.TN1, lanes.TP2, lanes.TN2]
 
 
-def moving_plant(law: str) -> Plant:
+def moving_plant(law):
     """A rig whose pistons slide, its bristles bent."""
     plant = Plant(Parameters().replace({"friction.law": law}))
     plant.advance(np.array([[0.6], [-0.6], [-0.4], [0.4]]), np.array([[20.0], [-10.0]]), 0.2)
@@ -21,14 +20,14 @@ def moving_plant(law: str) -> Plant:
     return plant
 
 
-def inside(plant: Plant) -> np.ndarray:
+def inside(plant):
     rows = np.empty((INSIDE, 1))
     look_inside(plant.state, plant.lane_parameters, rows)
     return rows[:, 0]
 
 
 @pytest.mark.parametrize("law", ["lugre", "elasto_plastic", "coulomb"])
-def test_friction_is_what_the_pistons_lack_of_acceleration(law: str) -> None:
+def test_friction_is_what_the_pistons_lack_of_acceleration(law):
     plant = moving_plant(law)
     still = np.zeros((4, 1)), np.zeros((2, 1))
     with_friction = plant.derivatives(plant.state, *still)
@@ -43,13 +42,13 @@ def test_friction_is_what_the_pistons_lack_of_acceleration(law: str) -> None:
     assert (np.abs(found) > 5).all()
 
 
-def test_flows_are_those_that_fill_the_chambers() -> None:
+def test_flows_are_those_that_fill_the_chambers():
     """The ideal gas: a chamber's mass P V / (R T) grows by what flows in."""
     plant = moving_plant("lugre")
     rig = Parameters()
     flows, step = inside(plant)[2:], 1e-6
 
-    def masses() -> np.ndarray:
+    def masses():
         halves = np.repeat([rig.cylinder1.stroke / 2, rig.cylinder2.stroke / 2], 2)
         lengths = halves + np.repeat(plant.piston[:, 0], 2) * [1, -1, 1, -1]
         areas = [rig.cylinder1.area_p, rig.cylinder1.area_n, rig.cylinder2.area_p, rig.cylinder2.area_n]

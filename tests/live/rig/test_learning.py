@@ -1,22 +1,16 @@
 """What the page learns with computes the gradients of training in PyTorch, and the rig runs what was learned."""
 
 import base64
-import shutil
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from agents.policy.files import load_policy
+from agents import TrainingSettings, load_policy
 from agents.policy.seeds import best_policy
-from agents.training.configuration import TrainingSettings
 from agents.training.lanes import Lanes
 from agents.training.validation import TRAINING_SEED
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.folder import PAGE, packed_page, write_page
 from birthsim_live.rig.learning import worlds
 from birthsim_live.rig.pack import LEARNED
 from tests.live.rig.worker import node, run
@@ -68,20 +62,12 @@ console.log(JSON.stringify(Array.from(network.weights)));
 """
 
 
-@pytest.fixture
-def page(tmp_path: Path) -> Path:
-    """What learning needs of the page."""
-    for name in ("learning", "rig"):
-        shutil.copytree(PAGE / name, tmp_path / name)
-    return tmp_path
-
-
-def numbers(text: str) -> np.ndarray:
+def numbers(text):
     return np.frombuffer(base64.b64decode(text))
 
 
 @pytest.mark.parametrize(("horizon", "steps"), [(10, 1600), (5, 40)])
-def test_gradients_are_those_of_training(page: Path, horizon: int, steps: int) -> None:
+def test_gradients_are_those_of_training(page, horizon, steps):
     """With 40 steps the last of eight lanes, which begin staggered, ends with the fifth step."""
     env = worlds(COUNT)
     env.steps = steps
@@ -105,7 +91,7 @@ def test_gradients_are_those_of_training(page: Path, horizon: int, steps: int) -
     np.testing.assert_allclose(observed[going], lanes.now.observation.detach().numpy()[going], rtol=1e-5, atol=1e-6)
 
 
-def test_an_update_is_one_of_adam(page: Path) -> None:
+def test_an_update_is_one_of_adam(page):
     gradients, rates = np.random.default_rng(0).normal(size=(3, 3)), [0.1, 0.05, 0.02]
     weights = torch.zeros(3, dtype=torch.float64, requires_grad=True)
     adam = torch.optim.Adam([weights], betas=(0.9, 0.99))
@@ -119,27 +105,24 @@ def test_an_update_is_one_of_adam(page: Path) -> None:
     np.testing.assert_allclose(found, weights.detach().numpy(), rtol=1e-9)
 
 
-def test_the_rig_runs_what_was_learned(tmp_path: Path) -> None:
+def test_the_rig_runs_what_was_learned(page):
     """A policy that is shipped, taught to the controller that learns, has the bits of that policy's own controller."""
-    write_page(tmp_path / "page", packed_page(Parameters()))
     network = load_policy(best_policy(LEARNED.partition(":")[2])).network
     taught = {
         "widths": [network.inputs, *(len(bias) for _, bias in network.layers)],
         "weights": np.concatenate([array.ravel() for one in network.layers for array in one]).tolist(),
         "mean": network.mean.tolist(), "deviation": np.sqrt(network.variance + 1e-8).tolist(),
     }  # fmt: skip
-    world: dict[str, Any] = {"scenario": "circle", "scenario_force": True}
+    world = {"scenario": "circle", "scenario_force": True}
 
-    def case(name: str, *taught: Any) -> list[tuple[str, Any]]:
+    def case(name, *taught):
         return [("set", {**world, "controller": name}), ("reset", None), *taught, ("advance", 200)]
 
-    own, learned, none = run(tmp_path / "page", case(LEARNED), case("learning", ("teach", taught)), case("learning"))
+    own, learned, none = run(page, case(LEARNED), case("learning", ("teach", taught)), case("learning"))
     assert np.array_equal(own[-1].row, learned[-1].row, equal_nan=True)
     assert not none[-1].of("openings").any()
     assert own[-1].of("openings").any()
 
 
-def test_a_rig_that_it_lost_begins_anew_when_more_is_known(tmp_path: Path) -> None:
-    write_page(tmp_path / "page", packed_page(Parameters()))
-    found = node(tmp_path / "page", LOST)
-    assert found == [["too hot", None], ["too hot", "too hot"]]  # under another controller nobody helps
+def test_a_rig_that_it_lost_begins_anew_when_more_is_known(page):
+    assert node(page, LOST) == [["too hot", None], ["too hot", "too hot"]]  # under another controller nobody helps

@@ -1,7 +1,5 @@
 """Settings in the page's address: what is unreadable is refused by name."""
 
-from typing import Any
-
 import pytest
 
 from tests.live.rig.worker import node
@@ -38,13 +36,13 @@ CASES = {
 
 
 @pytest.fixture(scope="module")
-def outcomes(page) -> dict[str, Any]:
+def outcomes(page):
     """Address -> what the page reads in it, and how the worker refuses that."""
     return dict(zip(CASES, node(page, SCRIPT, list(CASES)), strict=True))
 
 
 @pytest.mark.parametrize("search", CASES)
-def test_an_address_is_read_or_refused_by_name(search: str, outcomes: dict[str, Any]) -> None:
+def test_an_address_is_read_or_refused_by_name(search, outcomes):
     (read, refusal), wanted = outcomes[search], CASES[search]
     if isinstance(wanted, dict):
         assert (read, refusal) == (wanted, "")

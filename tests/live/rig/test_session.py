@@ -1,7 +1,5 @@
 """A rig that a person plays with: what changes while it moves, what it shows, and when it stands still."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -10,13 +8,13 @@ from birthsim_env.physics.compiled.lanes import parameter_array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import SLICES
 from birthsim_live.rig.stages import INSIDE, look_inside
-from tests.live.rig.worker import Told, run
+from tests.live.rig.worker import run
 
 CALM = ("set", {"controller": "admittance-backstepping"})
 ROW = {row.name: row.number for row in LAYOUT}
 RIG = Parameters()
 
-CHANGES: list[dict[str, Any]] = [
+CHANGES = [
     {"controller": "lqr"},
     {"controller": "residual:circle"},
     {"valves": "one_valve"},
@@ -34,15 +32,15 @@ CHANGES: list[dict[str, Any]] = [
 ]
 
 
-def held(x: float, y: float) -> tuple[str, Any]:
+def held(x, y):
     return "hold", {"position": [x, y]}
 
 
-def one(page, *steps: tuple[str, Any]) -> list[Told]:
+def one(page, *steps):
     return run(page, [CALM, ("reset", None), *steps])[0][2:]
 
 
-def test_displacement_is_force_over_stiffness_at_once(page) -> None:
+def test_displacement_is_force_over_stiffness_at_once(page):
     """Drag, read 2000 N/m; move the slider to 4000, and the displacement halves under one force."""
     steps = held(0.53, 0.0), ("advance", 1500), ("set", {"Kclx": 4000}), ("advance", 1500), ("hold", None), ("advance", 1000)
     _, pulled, _, halved, _, released = one(page, *steps)
@@ -55,7 +53,7 @@ def test_displacement_is_force_over_stiffness_at_once(page) -> None:
     assert released.frame["error_mm"] < 0.1
 
 
-def test_a_change_keeps_state_time_and_motion(page) -> None:
+def test_a_change_keeps_state_time_and_motion(page):
     begun = [CALM, ("set", {"scenario": "circle"}), ("reset", None), held(0.56, 0.02), ("advance", 700)]
     cases = [[*begun, ("set", changes), ("advance", 1), ("advance", 400)] for changes in CHANGES]
     for changes, told in zip(CHANGES, run(page, *cases), strict=True):
@@ -74,7 +72,7 @@ def test_a_change_keeps_state_time_and_motion(page) -> None:
 
 
 @pytest.mark.slow
-def test_the_next_episode_follows_without_a_jump(page) -> None:
+def test_the_next_episode_follows_without_a_jump(page):
     world = {"scenario": "dystocia", "scenario_force": True, "controller": "pid"}
     row = run(page, [("set", world), ("reset", None), ("advance", 60500)])[0][-1].row
     begins = int(np.flatnonzero(np.diff(row[:, SLICES["episode_time"]][:, 0]) < 0)[0])
@@ -85,7 +83,7 @@ def test_the_next_episode_follows_without_a_jump(page) -> None:
     assert np.abs(np.diff(table[:, SLICES["stiffness"]], axis=0)).max() < 100
 
 
-def test_more_damping_is_a_slower_answer(page) -> None:
+def test_more_damping_is_a_slower_answer(page):
     """Without dry friction: how far the hand has come 60 ms after it begins to pull."""
     names, factors = ("backstepping-frozen", "admittance-backstepping", "pid"), (1.0, 2.0)
     cases = [
@@ -98,7 +96,7 @@ def test_more_damping_is_a_slower_answer(page) -> None:
         assert much.of("position")[0] - 0.5 < 0.85 * (little.of("position")[0] - 0.5)
 
 
-def test_a_lost_rig_waits_for_reset(page) -> None:
+def test_a_lost_rig_waits_for_reset(page):
     steps = ("advance", 5), ("put", ["Pp1", 3e6]), ("advance", 50), ("advance", 10), ("reset", None), ("advance", 10)
     _, _, lost, still, reset, on = one(page, *steps)
     assert "pressure of chamber P1" in lost.lost
@@ -109,7 +107,7 @@ def test_a_lost_rig_waits_for_reset(page) -> None:
     assert one(page, ("put", ["v1", None]), ("advance", 2))[-1].halted
 
 
-def test_settings_show_the_setpoints_that_hold(page) -> None:
+def test_settings_show_the_setpoints_that_hold(page):
     settings = {"scenario": "circle"}, {"Kclx": 3000.0}, {"scenario": "forceps", "controller": "residual:circle"}
     circle, moved, forceps = run(page, [("set", one) for one in settings])[0]
     assert (circle.settings["Kpneu1"], circle.settings["damping_applies"]) == (4600.0, True)
@@ -119,8 +117,8 @@ def test_settings_show_the_setpoints_that_hold(page) -> None:
     assert forceps.settings["damping_applies"] is False
 
 
-def test_what_is_compared_starts_anew_and_all_else_goes_on(page) -> None:
-    others: list[dict[str, Any]] = [{"friction": 0.5}, {"scenario": "descent"}, {"scenario_force": True}, {"sensors": "lab"}]
+def test_what_is_compared_starts_anew_and_all_else_goes_on(page):
+    others = [{"friction": 0.5}, {"scenario": "descent"}, {"scenario_force": True}, {"sensors": "lab"}]
     steps = [step for changes in others for step in (("set", changes), ("advance", 20))]
     beside = [("set", {"compare": name}) for name in ("pid", "lqr", "nothing")]
     told = run(page, [beside[0], ("advance", 50), *steps, *beside[1:]])[0]
@@ -131,7 +129,7 @@ def test_what_is_compared_starts_anew_and_all_else_goes_on(page) -> None:
     assert told[-1].frame["second"] is None
 
 
-def test_one_hand_pulls_both_and_both_stand_still_where_one_is_lost(page) -> None:
+def test_one_hand_pulls_both_and_both_stand_still_where_one_is_lost(page):
     _, _, pulled, _, pushed, _, lost, still = run(
         page, [("set", {"compare": "admittance-backstepping"}), held(0.54, 0.0), ("advance", 800),
                ("hold", {"force": [20.0, 0.0]}), ("advance", 10), ("put", ["Pp1", 3e6, True]), ("advance", 5), ("advance", 5)]
@@ -147,7 +145,7 @@ def test_one_hand_pulls_both_and_both_stand_still_where_one_is_lost(page) -> Non
     assert (still.done, still.halted) == (0, True)
 
 
-def test_a_row_holds_friction_and_flows(page) -> None:
+def test_a_row_holds_friction_and_flows(page):
     told, rows = one(page, held(0.56, 0.02), ("advance", 300))[-1], np.empty((INSIDE, 1))
     look_inside(told.rows[-1, ROW["y1"] : ROW["y1"] + 18, None].copy(), parameter_array(RIG, 1), rows)
     assert np.array_equal(told.of("friction"), rows[:2, 0])

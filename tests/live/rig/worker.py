@@ -3,7 +3,6 @@
 import base64
 import json
 import subprocess
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,12 +65,12 @@ class Told(NamedTuple):
     halted: bool
     settings: dict[str, Any]
 
-    def of(self, name: str) -> np.ndarray:
+    def of(self, name):
         """A field of the last row."""
         return self.row[-1, SLICES[name]]
 
 
-def node(folder: Path, script: str, given: Any = None) -> Any:
+def node(folder, script, given=None):
     """What a script beside the page in ``folder`` prints as JSON; it reads what is ``given`` from its input."""
     need_program("node", "nodejs")
     (folder / "package.json").write_text('{"type": "module"}')
@@ -81,11 +80,11 @@ def node(folder: Path, script: str, given: Any = None) -> Any:
     return json.loads(done.stdout)
 
 
-def run(folder: Path, *cases: list[tuple[str, Any]]) -> list[list[Told]]:
+def run(folder, *cases):
     """What a rig says after each step of each case, ("set" | "reset" | "hold" | "put" | "teach" | "advance", value);
     ``folder`` holds the page."""
 
-    def told(said: dict[str, Any]) -> Told:
+    def told(said):
         widths, texts = (ROWS, ROWS, COLUMNS, COLUMNS), said.pop("rows")
         return Told(*(np.frombuffer(base64.b64decode(t)).reshape(-1, n) for t, n in zip(texts, widths, strict=True)), **said)
 

@@ -1,28 +1,21 @@
 """A live server for the tests of this folder."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-
 import pytest
 from starlette.testclient import TestClient
-from starlette.types import ASGIApp
 
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.folder import packed_page, write_page
+from birthsim_env import Parameters
 from birthsim_live.server.app import create_app
 
 HERE = "http://127.0.0.1:8000"
 
 
 @pytest.fixture(scope="session")
-def app(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ASGIApp]:
+def app(page):
     """The application, with controllers that run in Python and other options."""
-    folder: Path = tmp_path_factory.mktemp("served") / "page"
-    write_page(folder, packed_page(Parameters()))
-    return lambda *controllers, **options: create_app(folder, Parameters(), controllers, **options)
+    return lambda *controllers, **options: create_app(page, Parameters(), controllers, **options)
 
 
 @pytest.fixture
-def live(app: Callable[..., ASGIApp]) -> Iterator[TestClient]:
+def live(app):
     with TestClient(app("shut-valves"), base_url=HERE) as one:
         yield one

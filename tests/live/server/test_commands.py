@@ -2,17 +2,16 @@
 
 import signal
 import sys
-from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
 
-from tests.console import PATIENCE, call
+from tests.console import PATIENCE
 from tests.live.browser import Server
 
 
 @pytest.mark.slow
-def test_the_command_serves_until_an_interrupt_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_serves_until_an_interrupt_and_leaves_nothing(tmp_path, monkeypatch):
     host = "127.0.0.2" if sys.platform == "linux" else "127.0.0.1"  # others lack the rest of 127.0.0.0/8
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     with Server("live", "--host", host) as server:
@@ -23,14 +22,3 @@ def test_the_command_serves_until_an_interrupt_and_leaves_nothing(tmp_path: Path
         assert "Traceback" not in server.process.stdout.read()
         assert server.process.wait(PATIENCE) == 0
     assert list(tmp_path.iterdir()) == []
-
-
-def test_without_the_extra_it_says_how_to_get_it_before_anything_is_compiled(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "uvicorn", None)
-    monkeypatch.setattr("birthsim_live.commands.live.packed_page", None)
-    for command, arguments in (("live", []), ("live", ["--replay", "pull.rec"])):
-        status, _, complained = call(command, monkeypatch, capsys, *arguments)
-        assert status == 2
-        assert "pip install 'birthsim[live]'" in complained

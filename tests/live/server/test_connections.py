@@ -5,12 +5,11 @@ import http.client
 import logging
 import socket
 import threading
-from collections.abc import Iterator
 
 import pytest
 import uvicorn
 from websockets.exceptions import ConnectionClosedError
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 from birthsim_live.server.addresses import listen
 from birthsim_live.server.connections import LARGEST, configured
@@ -21,7 +20,7 @@ SHORT = 0.3  # s for a request
 
 
 @pytest.fixture(scope="module")
-def port(app) -> Iterator[int]:
+def port(app):
     """A server as the command makes it, in a thread."""
     with listen("127.0.0.1", 0) as listening:
         server = uvicorn.Server(configured(app("shut-valves"), SHORT))
@@ -33,11 +32,11 @@ def port(app) -> Iterator[int]:
         thread.join()
 
 
-def window(port: int) -> ClientConnection:
+def window(port):
     return connect(f"ws://127.0.0.1:{port}/controller?name=shut-valves")
 
 
-def answered(ws: ClientConnection) -> bool:
+def answered(ws):
     ws.send(numbers())
     return len(ws.recv()) == 32
 
@@ -49,7 +48,7 @@ HALVES = (
 
 
 @pytest.mark.parametrize("half", HALVES)
-def test_a_request_that_never_ends_is_closed_and_others_are_served(port: int, half: bytes) -> None:
+def test_a_request_that_never_ends_is_closed_and_others_are_served(port, half):
     with socket.create_connection(("127.0.0.1", port)) as stranger, window(port) as ws:
         stranger.sendall(half)
         while stranger.recv(1000):
@@ -58,7 +57,7 @@ def test_a_request_that_never_ends_is_closed_and_others_are_served(port: int, ha
         assert answered(ws)
 
 
-def test_half_a_second_request_is_closed_too(port: int) -> None:
+def test_half_a_second_request_is_closed_too(port):
     client = http.client.HTTPConnection("127.0.0.1", port)
     for _ in range(2):
         client.request("GET", "/none.js")
@@ -68,7 +67,7 @@ def test_half_a_second_request_is_closed_too(port: int) -> None:
     client.close()
 
 
-def test_text_that_is_no_text_closes_its_window_alone_and_quietly(port: int, caplog: pytest.LogCaptureFixture) -> None:
+def test_text_that_is_no_text_closes_its_window_alone_and_quietly(port, caplog):
     logging.getLogger("uvicorn.error").addHandler(caplog.handler)
     with window(port) as other, window(port) as ws:
         ws.send(b"\xff\xfe", text=True)
@@ -80,7 +79,7 @@ def test_text_that_is_no_text_closes_its_window_alone_and_quietly(port: int, cap
     assert caplog.records == []
 
 
-def test_a_message_that_is_too_large_closes_its_window(port: int) -> None:
+def test_a_message_that_is_too_large_closes_its_window(port):
     with window(port) as ws:
         ws.send(bytes(LARGEST + 1))
         with contextlib.suppress(ConnectionClosedError):

@@ -1,14 +1,11 @@
 """Controllers that run in Python for a rig in a browser: numbers in, openings out, or why not."""
 
 import threading
-from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
-from starlette.types import ASGIApp
 from starlette.websockets import WebSocketDisconnect
 
 from birthsim_env.loop.rows import ASKED, OPENING, WORLD
@@ -61,22 +58,22 @@ class Held(Law):
             GOES_ON.append(LET_GO.wait(60.0))
 """
 HANGS, LET_GO = threading.Event(), threading.Event()
-GOES_ON: list[bool] = []
+GOES_ON = []
 
 
-def numbers(rows: np.ndarray | None = None, sampled: bool = False) -> bytes:
+def numbers(rows=None, sampled=False):
     """What the page sends."""
     return np.concatenate([[float(sampled)], np.zeros(ASKED) if rows is None else rows]).tobytes()
 
 
 @pytest.fixture
-def own(tmp_path: Path) -> str:
+def own(tmp_path):
     (tmp_path / "mine.py").write_text(OWN + HELD)
     return str(tmp_path / "mine.py")
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_it_answers_what_it_commands_in_a_loop(sensors: str, own: str, app: Callable[..., ASGIApp]) -> None:
+def test_it_answers_what_it_commands_in_a_loop(sensors, own, app):
     seen = whole_rows("circle", sensors, "backstepping", 100)[:, WORLD:]
     name = f"{own}:Law"
     with TestClient(app(name), base_url=HERE) as live, live.websocket_connect(SOCKET + name) as ws:
@@ -89,7 +86,7 @@ ENDS = {"Fails": "ZeroDivisionError: division by zero", "Wide": "command()[0, 0]
 
 
 @pytest.mark.parametrize(("kind", "said"), ENDS.items())
-def test_one_that_gives_up_says_why_and_is_closed(kind: str, said: str, own: str, app: Callable[..., ASGIApp], capfd) -> None:
+def test_one_that_gives_up_says_why_and_is_closed(kind, said, own, app, capfd):
     name = f"{own}:{kind}"
     with TestClient(app(name), base_url=HERE) as live, live.websocket_connect(SOCKET + name) as ws:
         ws.send_bytes(numbers())
@@ -99,7 +96,7 @@ def test_one_that_gives_up_says_why_and_is_closed(kind: str, said: str, own: str
     assert "Traceback" in capfd.readouterr().err  # where the author looks
 
 
-def test_one_that_hangs_stops_nothing_else(own: str, app: Callable[..., ASGIApp]) -> None:
+def test_one_that_hangs_stops_nothing_else(own, app):
     hanging, other = f"{own}:Held", f"{own}:Law"
     with TestClient(app(hanging, other), base_url=HERE) as live, live.websocket_connect(SOCKET + hanging) as ws:
         for _ in range(10):
@@ -117,19 +114,19 @@ def test_one_that_hangs_stops_nothing_else(own: str, app: Callable[..., ASGIApp]
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 7, b"\0" * 8 * ASKED, b"\0" * 3000])
-def test_what_is_no_measurement_is_refused(content: bytes, live: TestClient, capfd) -> None:
+def test_what_is_no_measurement_is_refused(content, live, capfd):
     with live.websocket_connect(SOCKET + "shut-valves") as ws:
         ws.send_bytes(content)
         assert ws.receive_text().startswith("ValueError: ")
 
 
 @pytest.mark.parametrize("name", ["", "pid", "nobody", "/etc/passwd", "mine.py:Law"])
-def test_what_is_not_offered_does_not_run(name: str, live: TestClient) -> None:
+def test_what_is_not_offered_does_not_run(name, live):
     with pytest.raises(WebSocketDisconnect), live.websocket_connect(SOCKET + name) as ws:
         ws.receive_text()
 
 
-def test_the_page_offers_what_python_can_run(own: str) -> None:
+def test_the_page_offers_what_python_can_run(own):
     content = packed_page(Parameters()).content
     missing = [one["name"] for one in content["hello"]["choices"]["controller"] if "missing" in one]
     assert missing == ["shut-valves", "slammed-valves", "random-valves"]

@@ -23,7 +23,7 @@ HEADERS = [
 
 
 @pytest.mark.parametrize(("headers", "status"), HEADERS)
-def test_foreign_hosts_and_origins_are_refused(live: TestClient, headers: dict[str, str], status: int) -> None:
+def test_foreign_hosts_and_origins_are_refused(live, headers, status):
     reply = live.get("/main.js", headers=headers)
     assert reply.status_code == status
     if status == 200:
@@ -36,13 +36,13 @@ def test_foreign_hosts_and_origins_are_refused(live: TestClient, headers: dict[s
         ws.receive_text()
 
 
-def test_a_host_of_ones_own_is_the_only_one(app) -> None:
+def test_a_host_of_ones_own_is_the_only_one(app):
     with TestClient(app(hosts=("rig.example",)), base_url="http://rig.example:8000") as one:
         assert one.get("/nothing").status_code == 404
         assert one.get("/nothing", headers={"host": "127.0.0.1:8000"}).status_code == 403
 
 
-def test_pages_may_only_use_what_is_served_here(live: TestClient) -> None:
+def test_pages_may_only_use_what_is_served_here(live):
     for place in ("/", "/none.js"):
         headers = live.get(place).headers
         assert headers["content-security-policy"] == "frame-ancestors 'none'"
@@ -52,7 +52,7 @@ def test_pages_may_only_use_what_is_served_here(live: TestClient) -> None:
         assert live.get(place).status_code == 404
 
 
-def test_addresses() -> None:
+def test_addresses():
     with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ValueError, match=rf"port = {port} of 127.0.0.1 cannot be served \(.*\); allowed: a free port"):
