@@ -4,7 +4,9 @@ import gymnasium
 import numpy as np
 import pytest
 
+from agents.gradients.rollouts import Worlds
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
+from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
 from baselines.controller import checked_command
@@ -113,6 +115,9 @@ TABLE = {
     ("duration = ", ">= 4 and <= 600 (s)"): [later(propose, RIG)(value) for value in (0.0, 3.9, 601.0, NAN)],
     ("discount = ", "0 or more and less than 1"): [later(ShiftedReward, None, 1.0)(value) for value in (-0.1, 1.0, 2.0, NAN)],
     ("informed = 'yes'", "True, False"): [residual(informed="yes")],
+    ("env = ", "one made with autoreset_mode='SameStep'"): [
+        *(lambda wrapped=wrapped: wrapped(gymnasium.make_vec(CIRCLE, num_envs=2)) for wrapped in (SB3VecEnv, Worlds)),
+    ],
     ("range ", "a finite number or (low, high) of such"): [
         lambda bad=bad: draw(bad, np.random.default_rng(0)) for bad in ((2.0, 1.0), (1.0, 2.0, 3.0), (0.0, NAN), ("a", "b"))
     ],

@@ -135,6 +135,8 @@ TABLE = {
     "tune --controller pid --parameters nowhere.toml --out x": "'nowhere.toml'",
     "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
     "export --to onnx nowhere": "policy = 'nowhere'",
+    "export --to onnx circle --out own": "'own' is a folder; allowed: the name of a file",
+    "export --to onnx circle --out own.py/policy.onnx": "'own.py': File exists",
     "export --to fmux": "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help",
     "export --to stone": "--to 'stone'; allowed: onnx, hub, minari, wasm, ",
     "export": "--to is missing; allowed: onnx, hub, minari, wasm, ",
