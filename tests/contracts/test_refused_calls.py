@@ -184,6 +184,10 @@ TABLE = {
             randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
         ),
     ],
+    **{
+        (f"Mechanics.mass = {mass:g} kg is more than this rig can carry: ", ""): [started(parameters={"mechanics.mass": mass})]
+        for mass in (25.0, 400.0)
+    },
     ("mechanics.mas", "mass"): [env(randomize={"mechanics.mas": (2, 5)})],
     ("policy_period = 0.01", "control period 0.004 s"): [env(parameters={"electronics": {"control_period": 0.004}})],
     ("motor", "mechanics"): [env(randomize={"motor.mass": (2, 5)})],

@@ -95,6 +95,7 @@ TABLE = {
     "study compare": ("NAME = 'compare'; allowed: status, render, ", "comparison"),
     "figure4 --controller nobody --out x": f"controller = 'nobody'; {KNOWN}",
     "figure4 --set gain=3 --out x": "--set 'gain=3'; allowed for backstepping: weight_compensation, ",
+    "figure4 --set gain --out x": "--set 'gain'; allowed: GAIN=VALUE",
     "figure4 --sensors perfect --out x": ("--sensors", "perfect", *MODELS),
     "figure4 --parameters nowhere.toml --out x": "'nowhere.toml'",
     "figure4 --out own.py": "own.py'",
