@@ -1,11 +1,10 @@
-"""What the admittance with stiff backstepping achieves on the whole plant with friction: outcomes, and how it serves lanes."""
+"""What the admittance with stiff backstepping achieves on the whole plant with friction: outcomes."""
 
 import numpy as np
 import pytest
 
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
-from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -69,20 +68,3 @@ def test_it_comes_back_calmly_from_a_load_beyond_its_strength(sensors: str) -> N
         off.append(np.hypot(*(plant.end_effector()[:2, 0] - wanted.position[:, 0])))
     assert max(off) > 0.04
     assert max(off[1800:]) < 3e-3
-
-
-def recorded(lanes: int, ticks: int, sensors: str) -> list[tuple[Measurement, Reference]]:
-    """What a controller saw and was asked for while a rig with friction was pushed, every lane with noise of its own."""
-    wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), np.linspace(1500, 3000, lanes))
-    wanted.rows[14] = 500.0
-    plant, law, record = closed_loop.resting_at(wanted, BELIEVED), AdmittanceController(BELIEVED, learn=False), []
-
-    def remembered(measured: Measurement, reference: Reference) -> Array:
-        record.append((measured, reference))
-        return law.command(measured, reference)
-
-    force = np.repeat([[30.0], [10.0]], lanes, axis=1)
-    sense = closed_loop.ideal if sensors == "ideal" else closed_loop.tracker(BELIEVED, lanes)
-    for _ in closed_loop.run(plant, remembered, lambda t: wanted, lambda t: force, ticks * 1e-3, sense):
-        pass
-    return record

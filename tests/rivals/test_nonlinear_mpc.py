@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessTest, run_stiffness_test
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.horizon import FLOWS, HALF, NODES, SIZE, Situation, programme
@@ -14,8 +15,8 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.comparison.grid import default_controllers
+from tests.contracts.test_controllers import recorded
 from tests.controllers.test_informed import Aware
-from tests.controllers.test_through_friction import recorded
 from tests.oracles import closed_loop, derived_law, rigid_body
 
 RIG = Parameters()
@@ -155,7 +156,7 @@ def test_what_is_known_makes_the_plan_and_its_first_flow_the_openings(sensors: s
     controller, about, lanes = NonlinearMPC(RIG), constants(sensors), 2
     knowing = Aware(RIG, NonlinearMPC.TUNED, about.horizon)
     plan = np.zeros((SIZE, lanes))
-    for measured, wanted in recorded(lanes, 30, sensors):
+    for measured, wanted, _ in recorded(AdmittanceController(RIG, learn=False), sensors, RIG, lanes, 60)[0]:
         wanted.rows[12:14] = [[300.0, -200.0], [-150.0, 400.0]]
         openings = controller.command(measured, wanted)
         now = knowing.now(measured, wanted)

@@ -9,12 +9,10 @@ from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.tracking import Integrals, TrackingController
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.controllers.test_through_friction import recorded
 from tests.oracles import closed_loop
 from tests.oracles.observed import Sampled
 
 RIVALS = (PositionPID, LinearQuadratic, SlidingMode)
-PERIOD = 1e-3
 every_rival = pytest.mark.parametrize("rival", RIVALS, ids=lambda kind: kind.__name__)
 
 
@@ -74,16 +72,21 @@ def test_the_integral_of_the_pid_rests_while_the_supply_gives_no_more() -> None:
 @every_rival
 def test_the_observer_is_told_what_is_known(rival: type[TrackingController]) -> None:
     """The measured force, and in which lanes the compliant motion is faster than 1 mm/s."""
-    law, rig = rival(), Parameters()
-    told = Sampled(rig)
-    for measured, reference in recorded(2, 40, "lab"):
-        measured = dataclasses.replace(measured, user_force=np.zeros((2, 2)))
-        reference.rows[2] = [2e-3, 5e-4]
-        law.command(measured, reference)
-        told.update(measured, measured.user_force, moving=np.array([1.0, 0.0]))
+    law, rig, seen = rival(), Parameters(), []
+    told, reference = Sampled(rig), closed_loop.holding(np.repeat([[0.5], [0.0]], 2, axis=1), 2000.0)
+    plant, nothing = closed_loop.resting_at(reference, rig), np.zeros((2, 2))
+    reference.rows[2] = [2e-3, 5e-4]
+
+    def command(measured, reference):
+        seen.append(measured)
+        told.update(measured, nothing, moving=np.array([1.0, 0.0]))
+        return law.command(measured, reference)
+
+    for _ in closed_loop.run(plant, command, lambda t: reference, lambda t: nothing, 0.04, closed_loop.tracker(rig, 2)):
+        pass
     assert np.array_equal(law._memories[1], told.pistons.rows)
     assert told.pistons.rest[0, 0] == 0 < told.pistons.rest[0, 1]
-    pushed = dataclasses.replace(measured, user_force=np.full((2, 2), 3.0))
+    pushed = dataclasses.replace(seen[-1], user_force=np.full((2, 2), 3.0))
     law.command(pushed, reference)
     told.update(pushed, pushed.user_force, moving=np.ones(2))
     assert np.array_equal(law._memories[1][:, 0], told.pistons.rows[:, 0])
