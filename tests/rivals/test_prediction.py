@@ -206,19 +206,3 @@ def test_the_programme_is_that_of_errors_over_tolerances_weighed_by_time(rig: Pa
         j, r = slopes[:, :, lane], values[:, lane]
         np.testing.assert_allclose(g[:, lane], j @ r, rtol=0, atol=2e-5 * np.abs(j @ r).max())
         np.testing.assert_allclose(h[:, lane], (j @ j.T)[np.tril_indices(SIZE)], rtol=0, atol=2e-5 * np.abs(j @ j.T).max())
-
-
-def test_a_plan_that_keeps_the_balance_leaves_nothing_to_improve() -> None:
-    """At rest on the target, chambers shut, stiffnesses as asked for; also where what is unseen holds the user off."""
-    for rig in (Parameters(), TILTED):
-        now, given = rigid_body.near_balance(rig, 3, 3, 0.0, 0.0), Situation(np.zeros((Situation.size, 3)))
-        given.joints.position[:], given.pressure[:] = now.piston, now.pressures
-        given.stiffness[:] = np.tile(now.stiffness, (NODES, 1))
-        given.motion[:] = np.tile(
-            np.concatenate([rigid_body.pose_of(now.piston, rig).end_effector, np.zeros((2, 3))]), (NODES, 1)
-        )
-        given.force[:] = [[0.0, 12.0, -8.0], [0.0, -25.0, 9.0]]
-        held = -np.einsum("nci,cn->in", rigid_body.jacobians(now.piston, rig), given.force)
-        given.unseen[:] = np.tile(held, (NODES, 1))
-        h, g = programmes(rig, given, np.zeros((SIZE, 3)), np.ones(NODES))
-        assert np.abs(g).max() < 1e-6 * np.sqrt(h.max())
