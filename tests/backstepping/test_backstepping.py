@@ -10,10 +10,10 @@ from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles.gain_range import closed_loop_damping
+from tests.physics.rigs import TILTED
 
 
 def random_situations(
@@ -75,7 +75,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
 @pytest.mark.parametrize(
-    ("rig", "gain", "width"), [(Parameters(), 30.0, 0.01), (closed_loop.ANOTHER, 47.0, 0.004)], ids=["default", "another rig"]
+    ("rig", "gain", "width"), [(Parameters(), 30.0, 0.01), (TILTED, 47.0, 0.004)], ids=["default", "another rig"]
 )
 def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, width: float, options: dict[str, Any]) -> None:
     compensate, frozen = options.get("weight_compensation", False), options.get("frozen_friction", False)
@@ -107,7 +107,7 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
     np.testing.assert_allclose(terms.wanted, s["wanted"], rtol=1e-7, atol=1e-7)
 
 
-@pytest.mark.parametrize("rig", [Parameters(), closed_loop.ANOTHER], ids=["default", "another rig"])
+@pytest.mark.parametrize("rig", [Parameters(), TILTED], ids=["default", "another rig"])
 @pytest.mark.parametrize("factor", [1.02, 1.2, 1.5, 2.0])
 def test_a_damping_factor_multiplies_the_damping_of_equal_gains_and_leaves_the_stiffness(
     rig: Parameters, factor: float

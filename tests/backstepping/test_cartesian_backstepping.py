@@ -42,10 +42,7 @@ def times(matrices: Array, vectors: Array) -> Array:
 
 @pytest.mark.parametrize("rig", [FRICTIONLESS, ANOTHER], ids=["frictionless", "another rig"])
 def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> None:
-    """j = jt - 3 C (a - at + K e/m) - (3 C^2 + 2)(v - vt) + D K e/m^2, through valves, chambers and linkage of points.
-
-    Coulomb friction is in the model's acceleration, and constant in its derivative.
-    """
+    """j = jt - 3 C (a - at + K e/m) - (3 C^2 + 2)(v - vt) + D K e/m^2, with Coulomb friction constant in its derivative."""
     lanes, mass = 60, rig.mechanics.mass
     now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
     measured, matrices = rigid_body.seen(now, rig, np.zeros((2, lanes))), np.resize(np.array(MATRICES), (lanes, 2, 2))

@@ -76,11 +76,7 @@ def test_gains_miss_where_they_render_another_damping_by_more_than_a_millionth()
 
 @pytest.mark.parametrize(("ratio", "tolerance"), [(0.9, 0.045), (1.3, 0.025)])
 def test_stiffness_and_damping_asked_for_are_rendered(ratio: float, tolerance: float) -> None:
-    """A force that grows steadily is followed at the speed of K and late by B/K, both read off a straight line.
-
-    Poses, axes and 1000 to 4000 N/m; the mean of both directions, in which the turning of the linkage cancels. What is
-    missing is the air's: by dead volume and heat dF/dt is not quite (10), and B lacks that error per speed over a2 - phi.
-    """
+    """A growing force is followed at the speed of K and late by B/K; in the mean of both ways the linkage's turning cancels."""
     probes, speed = closed_loop.pushes((1.0, -1.0)), 0.003
     law = BacksteppingController(FRICTIONLESS, weight_compensation=True, damping_ratio=ratio)
     reference, growth = closed_loop.holding(probes.position, probes.stiffness[0]), speed * probes.stiffness[0] * probes.force

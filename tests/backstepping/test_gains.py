@@ -80,8 +80,7 @@ def test_least_stiffness_is_the_minimum_over_the_gain() -> None:
 
 @pytest.mark.parametrize("fraction", [1.03, 1.01, 1.001, 1.0001, 1.0, 0.99, 0.7, 0.3, 0.05, 0.0])
 def test_a_setpoint_beside_the_least_is_rendered_and_one_out_of_reach_gets_the_nearest(fraction: float) -> None:
-    """Two roots meet there and Newton slows down. Out of reach, with the drag Fv/m_e of any real rig (above 7 1/s), that is the
-    least stiffness; never a negative one."""
+    """Two roots meet there; out of reach, with the drag Fv/m_e of any real rig (above 7 1/s), it is the least stiffness."""
     for mass, viscous in rigs(200, 5):
         least = least_stiffness(mass, viscous)
         rendered = of_equal_gains(equal_gain(fraction * least, mass, viscous), mass, viscous)

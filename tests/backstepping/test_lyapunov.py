@@ -94,10 +94,7 @@ CASES: dict[str, tuple[dict[str, Any], tuple[float, float], bool]] = {
 
 @pytest.mark.parametrize(("options", "stiffness", "proved"), CASES.values(), ids=CASES.keys())
 def test_it_falls_on_the_model_as_predicted(options: dict[str, Any], stiffness: tuple[float, float], proved: bool) -> None:
-    """V falls in every step, its slope is the predicted one, and V stays below the bound that ``decay`` gives.
-
-    Where unequal gains vary quickly the bound for any errors proves nothing; V falls in this run all the same.
-    """
+    """V falls as predicted and stays below the bound of ``decay``, which proves nothing where unequal gains vary quickly."""
     values = run(BacksteppingController(FRICTIONLESS, **options), stiffness, 0.05)
     v, rate, decay = (np.array([getattr(value, name) for value in values]) for name in ("value", "rate", "decay"))
     assert np.all(np.diff(v, axis=0) < 0)

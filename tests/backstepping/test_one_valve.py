@@ -49,10 +49,7 @@ def balance(force: float, cylinder: Cylinder, rig: Parameters) -> Array:
 
 
 def test_pressures_settle_where_leakage_balances() -> None:
-    """No drift into saturation: each chamber ends where its valve's flows balance, and the stiffness is rendered there.
-
-    Valves that leak ten times more bring the end within ten seconds, which takes a minute with the default ones.
-    """
+    """Each chamber ends where its valve's flows balance: within ten seconds with valves that leak ten times more."""
     rig = FRICTIONLESS.replace({"valves.leakage_ratio": 0.05})
     reference = closed_loop.holding(np.ascontiguousarray(np.array(POSES).T), 2000.0)
     plant, law = closed_loop.resting_at(reference, rig), BacksteppingController(rig, True, valves="one_valve")

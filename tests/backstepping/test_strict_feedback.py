@@ -6,13 +6,13 @@ import sympy as sp
 
 from birthsim_env import Parameters
 from studies.verification.strict_feedback import neglected_acceleration, strict_feedback_rates
-from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
+from tests.physics.rigs import TILTED
 
 LANES = 40
 
 
-@pytest.fixture(scope="module", params=[Parameters(), closed_loop.ANOTHER], ids=["default", "another rig"])
+@pytest.fixture(scope="module", params=[Parameters(), TILTED], ids=["default", "another rig"])
 def case(request):
     """A rig, random sliding states with their chamber pressures and flows, X and U."""
     rig, rng = request.param, np.random.default_rng(3)

@@ -4,7 +4,9 @@ import gymnasium
 import numpy as np
 import pytest
 
+from agents.gradients.rollouts import Worlds
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
+from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.shifted_reward import ShiftedReward
 from baselines import BacksteppingController, make_controller
 from baselines.controller import checked_command
@@ -112,6 +114,9 @@ TABLE = {
     ("duration = ", ">= 4 and <= 600 (s)"): [later(propose, RIG)(value) for value in (0.0, 3.9, 601.0, NAN)],
     ("discount = ", "0 or more and less than 1"): [later(ShiftedReward, None, 1.0)(value) for value in (-0.1, 1.0, 2.0, NAN)],
     ("informed = 'yes'", "True, False"): [residual(informed="yes")],
+    ("env = ", "one made with autoreset_mode='SameStep'"): [
+        *(lambda wrapped=wrapped: wrapped(gymnasium.make_vec(CIRCLE, num_envs=2)) for wrapped in (SB3VecEnv, Worlds)),
+    ],
     ("range ", "a finite number or (low, high) of such"): [
         lambda bad=bad: draw(bad, np.random.default_rng(0)) for bad in ((2.0, 1.0), (1.0, 2.0, 3.0), (0.0, NAN), ("a", "b"))
     ],
@@ -178,6 +183,10 @@ TABLE = {
             randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
         ),
     ],
+    **{
+        (f"Mechanics.mass = {mass:g} kg is more than this rig can carry: ", ""): [started(parameters={"mechanics.mass": mass})]
+        for mass in (25.0, 400.0)
+    },
     ("mechanics.mas", "mass"): [env(randomize={"mechanics.mas": (2, 5)})],
     ("policy_period = 0.01", "control period 0.004 s"): [env(parameters={"electronics": {"control_period": 0.004}})],
     ("motor", "mechanics"): [env(randomize={"motor.mass": (2, 5)})],

@@ -39,15 +39,6 @@ def test_with_exact_sensors_and_no_rate_it_is_the_law_that_does_not_learn():
     )
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "honest"])
-@pytest.mark.parametrize("learn", [True, False])
-def test_without_a_force_sensor_the_hands_force_is_not_read(sensors, learn):
-    found = openings("admittance-sensorless", sensors, learn=learn)
-    pushed = openings("admittance-sensorless", sensors, shown=lambda seen: {"user_force": seen.user_force + 25.0}, learn=learn)
-    np.testing.assert_array_equal(found, pushed)
-    assert np.abs(found).max() > 0.01
-
-
 @pytest.mark.parametrize("factor", [0.5, pytest.param(1.6, marks=pytest.mark.slow)])
 def test_friction_that_is_not_as_believed_is_learned_on_a_circle(factor):
     true = closed_loop.slippery(factor)

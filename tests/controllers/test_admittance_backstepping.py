@@ -16,8 +16,9 @@ from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.compiled.lanes import SPOOLS, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles import closed_loop, rigid_body
 from tests.oracles import linkage_by_points as by_points
+from tests.oracles import rigid_body
+from tests.physics.rigs import TILTED
 
 PERIOD = 1e-3
 
@@ -75,13 +76,10 @@ def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, fract
     return motion, measured
 
 
-@pytest.mark.parametrize("rig", [Parameters(), closed_loop.ANOTHER], ids=["default", "another rig"])
+@pytest.mark.parametrize("rig", [Parameters(), TILTED], ids=["default", "another rig"])
 @pytest.mark.parametrize("fraction", [0.0, 1.0], ids=["told of nothing", "told of forces"])
 def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters, fraction: float) -> None:
-    """j = jr - 3 c (a - ar) - (3 c^2 + 2)(v - vr) - (c^3 + 2 c)(x - xr), a with all that is known.
-
-    Forces along the pistons that grow: the law knows both from what it is told, beside what is unseen.
-    """
+    """j = jr - 3 c (a - ar) - (3 c^2 + 2)(v - vr) - (c^3 + 2 c)(x - xr), a with what is unseen and with what it is told."""
     lanes, c, rng = 60, 60.0, np.random.default_rng(2)
     now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
     user, disturbance_force = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
@@ -101,10 +99,7 @@ def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters, fra
 @pytest.mark.parametrize("cylinder", [0, 1])
 @pytest.mark.parametrize(("resting", "push"), [(1.0, 3.0), (1.0, 1.0), (0.4, 3.0)])
 def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int, resting: float, push: float) -> None:
-    """Errors along a resting piston within the zone change nothing; beyond it they weigh ``rest_push``; moving, all count.
-
-    A piston that half rests has half the zone and half of what ``rest_push`` adds.
-    """
+    """Errors beyond it weigh ``rest_push``; a piston that half rests has half the zone and half of what ``rest_push`` adds."""
     rig, zone = Parameters(), 1e-4
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
     sizes = np.array([0.0, 0.3, 0.99, 1.5])
@@ -154,7 +149,7 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
 @pytest.mark.parametrize("lead_time", [0.0015, 0.01])
 def test_the_law_leads_every_spool_from_where_it_is(lead_time: float) -> None:
     """After one period the plant's spools have gone the fraction 1 - exp(-T/lead) of their ways to what the law wants."""
-    rig, lanes = closed_loop.ANOTHER, 40
+    rig, lanes = TILTED, 40
     now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.05, push=3.0)
     nothing = np.zeros((2, lanes))
     motion, _ = near(now, rig, nothing, seed=1)

@@ -108,22 +108,6 @@ def end_effector(piston: Array) -> Array:
 
 
 @either
-def test_at_rest_nothing_is_wanted_but_the_target(sampled: bool) -> None:
-    """On the target, in balance, without friction to be felt: the motion is the target, nothing acts unseen, nothing moves."""
-    wanted = closed_loop.holding(end_effector(PISTON), 2000.0)
-    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware()
-    for tick in range(50):
-        now = part.now(seen(tick, PISTON, pressures, nothing, sampled), wanted)
-    assert np.array_equal(now.motion, np.concatenate([wanted.position, np.zeros((6, 2))]))
-    np.testing.assert_allclose(now.joints, np.concatenate([PISTON, nothing]), rtol=0, atol=1e-9)
-    np.testing.assert_allclose(now.pressures, pressures, rtol=1e-9)
-    np.testing.assert_allclose(now.disturbance, 0, atol=1e-6)
-    for zeros in (now.spools, now.believed, now.moving, now.force):
-        assert not zeros.any()
-    assert np.all(now.rest > 0.1) if sampled else not now.rest.any()
-
-
-@either
 def test_a_held_push_moves_the_target_as_the_spring_says(sampled: bool) -> None:
     """A coupled spring under 20 N: after a second the motion stands K^-1 F beside the target; it moved meanwhile."""
     wanted = closed_loop.holding(end_effector(PISTON), np.array([[1500.0, 3000.0], [2500.0, 1200.0]]))
@@ -136,16 +120,14 @@ def test_a_held_push_moves_the_target_as_the_spring_says(sampled: bool) -> None:
     way = np.stack([np.linalg.solve(spring, force) for spring, force in zip(springs, push.T, strict=True)], axis=1)
     np.testing.assert_allclose(now.motion[:2], wanted.position + way, rtol=0, atol=1e-8)
     assert np.array_equal(now.force, push)
+    assert np.all(now.rest > 0.1) if sampled else not now.rest.any()
     assert np.all(np.array(moved)[5:50] == 1)
     assert not now.moving.any()
 
 
 @either
 def test_the_disturbance_is_what_holds_the_pistons_unseen(sampled: bool) -> None:
-    """Chambers push by 25 and -12 N more than the weight needs, and yet nothing moves: d is that force over the masses.
-
-    Where a user pushes too, that push is held as well: by friction that is believed along the motion, and d for the rest.
-    """
+    """Chambers push by 25 and -12 N beyond the weight, a user too, and nothing moves: friction is believed, d the rest."""
     extra, areas = np.array([[25.0], [-12.0]]), np.array([[RIG.cylinder1.area_p], [RIG.cylinder2.area_p]])
     user = np.array([[8.0, 0.0], [-6.0, 0.0]])
     pressures = balanced(PISTON)
@@ -246,10 +228,7 @@ def turning(tick: int, push: Array) -> tuple[Measurement, Reference]:
 @either
 @pytest.mark.parametrize("fraction", [0.0, 0.4, 1.0])
 def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_of_now(sampled: bool, fraction: float) -> None:
-    """Both come true where the push stays, the target goes on with its jerk, and what is observed stays as it is.
-
-    Targets turn round on the way, and friction with them. Asking changes nothing.
-    """
+    """Both come true where the push stays and the target goes on with its jerk and turns round. Asking changes nothing."""
     part, kept = aware(friction_fraction=fraction), aware(friction_fraction=fraction)
     push = np.array([[9.0, -4.0], [-6.0, 7.0]])
 

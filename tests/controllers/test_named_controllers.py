@@ -1,16 +1,16 @@
 """Controllers by name: those of the package, and a user's own from a file."""
 
-import gymnasium
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from baselines.about import uses_force
-from baselines.backstepping.controller import BacksteppingController
-from baselines.registry import SHORT_NAMES, controller_names, make_controller, resolved
+from baselines.registry import SHORT_NAMES, make_controller, resolved
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
+from tests.contracts.test_controllers import CONTROLLED, recorded
 
-CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 
@@ -69,17 +69,6 @@ def test_two_files_of_one_name_are_two_controllers(tmp_path):
     assert numpy is np
 
 
-def test_short_names_of_the_papers_law_have_their_options():
-    assert {"backstepping", "admittance", "residual"} <= set(controller_names())
-    env = gymnasium.make_vec(CIRCLE, num_envs=2)
-    env.reset(seed=0)
-    weight = {"weight_compensation": True}
-    names = {"backstepping": {}, "backstepping-weight": weight, "backstepping-frozen": {**weight, "frozen_friction": True}}
-    for name, options in names.items():
-        expected = BacksteppingController(RIG, **options).command(env.measurement, env.reference)
-        np.testing.assert_array_equal(make_controller(name, RIG).command(env.measurement, env.reference), expected)
-
-
 @pytest.mark.parametrize("name", SHORT_NAMES)
 def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     assert resolved(name) == resolved(SHORT_NAMES[name])
@@ -91,13 +80,24 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
         np.testing.assert_array_equal(one.constants, other.constants)
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [
-        ("backstepping-weight", False), ("shut-valves", False), ("admittance-sensorless", False),
-        ("admittance[force_sensor=false,identified=true]", False), ("residual:circle_honest_student", False),
-        ("residual:circle", True), ("limited:pid", True), ("limited:backstepping", True), ("admittance[learn=false]", True),
-    ],
-)  # fmt: skip
-def test_a_table_knows_who_is_told_the_force(name, told):
-    assert uses_force(name) == told
+@pytest.mark.parametrize("sensors", ["ideal", "honest"])
+@pytest.mark.parametrize("name", [*CONTROLLED, "residual:circle", "admittance[force_sensor=false,learn=false]"])
+def test_a_force_that_is_shown_moves_those_who_are_said_to_use_it_and_nobody_else(name, sensors):
+    made = f"residual[policy={name.partition(':')[2]}]" if name.startswith("residual:") else name
+    law, pushed = (make_controller(made, RIG) for _ in range(2))
+    moved = False
+    for measured, wanted, _ in recorded(make_controller(made, RIG), sensors, RIG, 3, 40)[0]:
+        lie = replace(measured, user_force=measured.user_force + 25.0)
+        moved |= (law.command(measured, wanted) != pushed.command(lie, wanted)).any()
+    assert moved == uses_force(name)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "honest"])
+@pytest.mark.parametrize("name", CONTROLLED)
+def test_a_lane_without_numbers_gets_openings_that_valves_have_and_disturbs_no_other(name, sensors):
+    law, blind = (make_controller(name, RIG) for _ in range(2))
+    for tick, (measured, wanted, _) in enumerate(recorded(make_controller(name, RIG), sensors, RIG, 3, 8)[0]):
+        unknown = measured.position * [1.0, 1.0, np.nan if tick in (3, 4) else 1.0]
+        openings = blind.command(replace(measured, position=unknown), wanted)
+        np.testing.assert_array_equal(openings[:, :2], law.command(measured, wanted)[:, :2])
+        assert np.all(np.abs(openings) <= 1)

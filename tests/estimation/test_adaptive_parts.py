@@ -66,26 +66,20 @@ def test_nothing_is_learned_of_a_piston_that_is_stuck():
     np.testing.assert_array_equal(friction.level, 1.0)
 
 
-def test_a_force_sensor_is_tared_at_the_start_up_to_what_its_bias_can_be():
+TARED = {
+    "up to what its bias can be": (0.0, lambda time: (0.0, -50.0), (0.0, -47.5)),
+    "but for a hand that comes meanwhile": (0.0, lambda time: (20.0 * (time > 0.1), -8.0 * (time > 0.2)), (20.0, -8.0)),
+    "not at all where a law starts later": (3.0, lambda time: (1.0, 1.0), (1.5, 1.5)),
+}
+"""When it begins, s; the hand, N, beside a bias of 0.5 N; and what is taken for the hand."""
+
+
+@pytest.mark.parametrize(("begin", "hand", "found"), TARED.values(), ids=TARED)
+def test_a_force_sensor_is_tared(begin, hand, found):
     memory, force = np.zeros((2, 1)), np.empty((2, 1))
-    measured = np.array([[0.5], [-50.0]])
-    for k in range(1000):
-        force_bias.tare(memory, np.array([k * PERIOD]), measured, 2.0, 0.5, PERIOD, force)
-    np.testing.assert_allclose(force[:, 0], [0.0, -48.0], atol=1e-12)
-
-
-def test_a_hand_that_comes_while_a_force_sensor_is_tared_does_not_count():
-    memory, force = np.zeros((2, 1)), np.empty((2, 1))
-    for k in range(1000):
-        hand = np.array([[20.0 * (k * PERIOD > 0.1)], [-8.0 * (k * PERIOD > 0.2)]])
-        force_bias.tare(memory, np.array([k * PERIOD]), 0.5 + hand, 2.0, 0.5, PERIOD, force)
-    np.testing.assert_allclose(force[:, 0], [20.0, -8.0], atol=1e-12)
-
-
-def test_a_law_that_starts_later_tares_nothing():
-    memory, force = np.zeros((2, 1)), np.empty((2, 1))
-    force_bias.tare(memory, np.array([3.0]), np.ones((2, 1)), 2.0, 0.5, PERIOD, force)
-    np.testing.assert_array_equal(force, 1.0)
+    for time in begin + PERIOD * np.arange(1000):
+        force_bias.tare(memory, np.array([time]), np.transpose([hand(time)]) + 0.5, 2.0, 0.5, PERIOD, force)
+    np.testing.assert_allclose(force[:, 0], found, atol=1e-12)
 
 
 SWING, PUSH, SECONDS = 2.0 * np.pi * 7.0, np.array([9.0, 14.0]), 3.0

@@ -105,8 +105,7 @@ def truth(rig: Parameters, openings: Array, times: Array) -> tuple[Array, Array]
 
 @pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
 def test_what_was_commanded_tells_spools_and_pressures(rig: Parameters) -> None:
-    """Blind but for the first instant, 0.16 s of swings and strokes of the valves: spools exactly, pressures but for what
-    Euler's step leaves, half as much with half the period."""
+    """0.16 s blind: spools exactly, pressures but for what Euler's step leaves, half as much with half the period."""
     openings, errors = commands(20), []
     for period in (1e-3, 5e-4):
         times = period * np.arange(round(20 * HOLD / period))

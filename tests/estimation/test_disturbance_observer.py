@@ -64,10 +64,7 @@ def swinging(unknown: Array, known: Callable[[float], Array], user: Array, secon
 
 
 def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
-    """d is the unknown force over the apparent mass; what is known, of the user and along the pistons, is not in it.
-
-    It changes with the pose, which d follows 2/w late; half a period of jerk is what Euler's step leaves.
-    """
+    """d, 2/w late, is the unknown force over the apparent mass; what is known, of user and pistons, is not in it."""
     unknown, user = np.array([15.0, -8.0]), np.array([6.0, 12.0])
 
     def known(time: float) -> Array:

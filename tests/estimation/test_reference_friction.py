@@ -73,10 +73,7 @@ def drags(rig: Parameters, times: Array, motion: Callable[[Array], Array]) -> Ar
 
 @pytest.mark.parametrize("period", [2.5e-4, 1e-3])
 def test_friction_is_lugre_along_the_reference(period: float) -> None:
-    """A turn and a half with reversals of both pistons: RMS within 0.5 % and everywhere within 3 % of the Coulomb friction.
-
-    Measured: 0.34 and 2.2 %, of which a part is that no deflection above G(v)/s0 is kept while G falls.
-    """
+    """A turn and a half with reversals; measured: RMS 0.34 and largest 2.2 % of the Coulomb friction, a part where G falls."""
     rig = RIG.replace({"electronics.control_period": period})
     times = period * np.arange(round(4.0 / period))
     got = drags(rig, times, circle)

@@ -73,11 +73,7 @@ def test_a_piston_that_may_not_rest_never_does() -> None:
 
 @pytest.mark.parametrize("speed", [0.01, 0.03, 0.1])
 def test_a_piston_that_slips_is_noticed(speed: float) -> None:
-    """Mostly before it has moved by 0.35 mm, 3.5 times the tracker's noise, and 10 ms; from 30 mm/s on its speed is found.
-
-    Slower than the speed's noise it falls back to rest again and again: at 10 mm/s a third of the speed is seen, and the
-    position trails by 0.06 mm.
-    """
+    """Mostly before 0.35 mm and 10 ms; slower than the noise of speed it falls back to rest and trails by 0.06 mm."""
     rig, lanes, woken, errors = Parameters(), 16, np.full(16, np.inf), []
     estimator = Sampled(rig)
     for measured in stuck(rig, lanes, 1.5, speed):

@@ -39,8 +39,7 @@ def test_taped_and_tangent_steps_have_the_bits_of_the_plant() -> None:
 
 
 def test_gradients_are_differences_on_drawn_rigs() -> None:
-    """1000 states far from rest over 10 ms: 99 % within 1e-6; what is farther off is on a kink within the difference, and is
-    within 1e-6 of a difference of a tenth its size."""
+    """1000 states far from rest over 10 ms: 99 % within 1e-6; the rest is on a kink, and within it of a smaller difference."""
     plant, opening, force = plant_of(1000, 3)
     state, rig = plant.state.copy(), plant.lane_parameters.copy()
     way, weight = along(1000, rig, 1, 4), np.random.default_rng(5).standard_normal((18, 1000)) / SCALES
@@ -86,8 +85,7 @@ def test_reverse_is_forward_mode() -> None:
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads the processor's instructions")
 @pytest.mark.slow
 def test_the_adjoint_runs_on_vectors() -> None:
-    """Vectorisation breaks in silence: a division of four lanes for every one in the source, and those of single lanes are
-    of the rest that is no whole vector."""
+    """Vectorisation breaks in silence: a division of four lanes for every one in the source."""
     adjoint = made.adjoint
 
     @numba.njit(error_model="numpy")

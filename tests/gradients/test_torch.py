@@ -66,11 +66,6 @@ def test_the_last_step_of_an_episode_has_the_gradients_of_any_other() -> None:
     np.testing.assert_array_equal(*found)
 
 
-def test_worlds_that_end_otherwise_are_refused() -> None:
-    with pytest.raises(ValueError, match="SameStep"):
-        Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2))
-
-
 @pytest.mark.slow
 def test_the_example_learns_in_a_hundred_updates() -> None:
     errors = run_path(f"{ROOT}/examples/gradients.py")["train"](120)

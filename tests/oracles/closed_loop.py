@@ -20,16 +20,6 @@ FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinde
 """Neither Coulomb nor Stribeck friction; the viscous part stays."""
 
 
-ANOTHER = Parameters().replace(
-    {
-        "geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.2,
-        "cylinder1.viscous_friction": 55.0, "cylinder2.coulomb_friction": 22.0, "cylinder2.rod_diameter": 0.012,
-        "air.temperature": 300.0, "air.polytropic_index": 1.3, "valves.critical_ratio": 0.4, "valves.time_constant": 0.006,
-    }
-)  # fmt: skip
-"""A rig of which most figures are others."""
-
-
 def slippery(scale: float, law: str = "lugre") -> Parameters:
     """The rig with ``scale`` times its Coulomb friction, 12 and 15 N."""
     coulomb = {"cylinder1.coulomb_friction": 12.0 * scale, "cylinder2.coulomb_friction": 15.0 * scale}

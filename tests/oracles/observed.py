@@ -5,7 +5,7 @@ import numpy as np
 from baselines.estimation import disturbance_observer, observers
 from baselines.estimation.rows import Belief, Given, Pistons
 from birthsim_env.loop.rows import Signals, fill_measurement
-from birthsim_env.loop.signals import Joints, Mask, Measurement, Point
+from birthsim_env.loop.signals import Joints, Measurement, Point
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -25,10 +25,6 @@ class Sampled:
     def __init__(self, rig: Parameters, bandwidth: float = observers.BANDWIDTH) -> None:
         self._belief, self._fresh = Belief(observers.belief(rig, bandwidth)), observers.fresh_memory(rig, sampled=True)
         self._lanes = 0
-
-    def reset(self, lanes: Mask) -> None:
-        if self._lanes:
-            self.pistons.rows[:, lanes] = self._fresh[:, None]
 
     def update(
         self, seen: Measurement, force: Array | None = None, believed: Array | None = None, moving: Array | None = None

@@ -148,11 +148,8 @@ def test_a_converter_rounds_to_its_steps_and_saturates():
     assert len(np.unique(force)) == 201  # every newton has a step of its own
     np.testing.assert_allclose(seen["pressures"], round(123456 / 8e5 * 1024) * 8e5 / 1024)
     np.testing.assert_array_equal(watch(electronics, 3, pressures=9e5)["pressures"], 8e5)
-
-
-def test_bits_are_whole():
     one, other = (watch(board(**{**EXACT, "adc_bits": bits}), 40, force=pull)["user_force"] for bits in (11.6, 12.0))
-    np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(one, other, "bits are whole")
 
 
 @pytest.mark.parametrize("place", [(0.5, 0.0), (0.5, 0.15), (0.62, -0.1)])

@@ -89,12 +89,6 @@ def test_a_circle_has_its_radius_and_its_sense(period, radius):
     assert_consistent(circle, times)
 
 
-def test_hold_stays():
-    rows = sampled(prepared(Hold((0.45, 0.02))), np.linspace(0, 9, 30))
-    np.testing.assert_array_equal(rows[:2].T - (0.45, 0.02), np.zeros((30, 2)))
-    np.testing.assert_array_equal(rows[2:], 0.0)
-
-
 def boundary_margin(x, y):
     """Distance (m) by which points (x, y) lie inside the workspace, from its boundary drawn with the DIRECT model."""
     radius, angle = np.hypot(x, y), np.arctan2(y, x)

@@ -57,15 +57,6 @@ def test_every_stream_of_every_episode_is_its_own_and_repeatable(seed, episode):
     assert all(first_draw(*key) == value for key, value in draws.items())
 
 
-def test_neighbouring_seeds_and_episodes_are_uncorrelated():
-    table = np.array([[[first_draw(s, e, name) for name in STREAMS] for e in range(20)] for s in range(60)]) - 0.5
-    bound = 4.5 / 12 / np.sqrt(table[1:].size)
-    for axis in range(3):
-        ahead, behind = (np.take(table, range(k, table.shape[axis] - 1 + k), axis) for k in (0, 1))
-        assert abs((ahead * behind).mean()) < 1.2 * bound
-    assert abs(table.mean()) < 4.5 / np.sqrt(12 * table.size)
-
-
 @pytest.mark.parametrize("scenario", [False, True])
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_other_random_parts_do_not_move_reference_stiffness_and_force(scenario, sensors):

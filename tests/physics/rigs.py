@@ -33,7 +33,7 @@ TILTED = Parameters().replace(
     {
         **{"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.2},
         **{"cylinder1.viscous_friction": 55.0, "cylinder2.coulomb_friction": 22.0, "cylinder2.rod_diameter": 0.012},
-        **{"air.temperature": 310.0, "air.polytropic_index": 1.3},
+        **{"air.temperature": 310.0, "air.polytropic_index": 1.3, "valves.critical_ratio": 0.4},
         **{"chambers.dead_volume": 1.7e-5, "valves.time_constant": 0.006},
     }
 )

@@ -120,10 +120,7 @@ def test_friction_takes_energy_over_a_cycle(amplitude: float, law: str) -> None:
 
 
 def test_presliding_is_a_spring_without_drift_where_lugre_drifts() -> None:
-    """6 N with 5 N swinging at 5 Hz on it, below the 14 N of break-away, on cylinder 2 for 4 s, by SciPy and by the plant.
-
-    The spring is linear: m y'' + (s1 + Fv) y' + s0 y = F, whose steady answer to a sine of whole periods is known.
-    """
+    """6 N with 5 N at 5 Hz on it, below break-away, for 4 s; m y'' + (s1 + Fv) y' + s0 y = F has a known answer to a sine."""
     omega, ends = 2 * math.pi * 5, {}
     spring = 6 / S0 + (5 / (S0 - MASS * omega**2 + 1j * omega * (S1 + FV))).imag
     push = np.zeros((16000, 2, 1))

@@ -119,8 +119,7 @@ def test_along_a_trajectory_lanes_have_the_differences_of_their_plants() -> None
 
 @pytest.mark.slow
 def test_options_of_a_rig_have_their_states() -> None:
-    """At rest the plant's motion over 10 us is the matrix exponential of A, B. Shut valves leak 1e4 Pa/s, of which 10 us are
-    1e-6 of a pressure; what the integrator leaves out of the fastest mode, 5000/s, is less."""
+    """At rest the motion over 10 us is the matrix exponential of A, B; shut valves leak 1e-6 of a pressure meanwhile."""
     given = {"air.supply_conductance": 2e-8, "chambers.tube_length": 0.5, "mechanics.mode_frequency": 20.0}
     rig, hand = Parameters().replace(given), np.array([6.0, -4.0])
     model = linearize(rig, pose_of(rig, 0.03, -0.07), force=hand)

@@ -81,9 +81,3 @@ def test_a_perfect_lane_among_worn_ones_has_the_bits_of_a_perfect_rig():
         observation = env.step(np.tile(rng.uniform(-0.2, 0.2, 4).astype(np.float32), (2, 1)))[0]
     np.testing.assert_array_equal(observation[0], run(2, 3)[-1, 0])
     assert not np.array_equal(observation[1], run(2, 3)[-1, 1])
-
-
-def test_options_of_the_valves_change_no_stored_rig():
-    assert "deadband" not in Parameters().to_dict()["valves"]
-    rig = Parameters().replace(WORN)
-    assert Parameters.from_dict(rig.to_dict()) == rig

@@ -6,7 +6,6 @@ import pytest
 
 from agents.residual.law import observation_names
 from agents.residual.settings import FORCE_LAWS, LAWS, NO_LAW, ResidualSettings
-from baselines.registry import SHORT_NAMES
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensors import SENSORS
 
@@ -78,10 +77,3 @@ def test_the_force_that_is_shown_is_zero_from_the_first_observation_on():
         assert not env.measurement.user_force.any()
         *_, info = env.step(np.zeros(4))
     assert np.abs(info["user_force"]).max() > 5
-
-
-@pytest.mark.parametrize("law", ["backstepping-force-first", "admittance-sensorless"])
-def test_a_law_is_the_same_by_its_name_with_options(law):
-    actions = np.full((STEPS, LANES, 2), 0.3, np.float32)
-    for one, other in zip(course(law, actions), course(SHORT_NAMES[law], actions), strict=True):
-        np.testing.assert_array_equal(one, other)

@@ -1,4 +1,4 @@
-"""What a policy's network computes: by hand, against PyTorch, with the same bits for one lane and many."""
+"""What the memory of a policy's network computes, against PyTorch; its layers: ``tests/training/test_algorithms.py``."""
 
 from dataclasses import replace
 
@@ -6,30 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.policy.network import PolicyNetwork
 from tests.residual.policies import INPUTS, network
-
-
-def test_a_network_is_normalization_tanh_layers_and_a_clip():
-    hand = PolicyNetwork(
-        np.array([1.0, 0.0]),
-        np.array([4.0, 0.25]),
-        (
-            (np.array([[1.0, 0.0], [0.0, 2.0]], np.float32), np.array([0.0, 0.5], np.float32)),
-            (np.array([[1.0, 1.0], [0.0, 3.0]], np.float32), np.array([0.1, 0.0], np.float32)),
-        ),
-    )
-    assert (hand.inputs, hand.outputs) == (2, 2)
-    # Actions are singles, rounded by 6e-8 of their size; EPSILON of the variance counts 1.3e-9 to 2e-8.
-    one, other = np.tanh((2 - 1) / 2), np.tanh(2 * -0.5 / 0.5 + 0.5)
-    seen = np.array([[2.0, -0.5], [1e9, 1e9]], np.float32)
-    actions = hand.actions(seen)
-    np.testing.assert_allclose(actions[0], [one + other + 0.1, max(3 * other, -1)], rtol=1e-6)
-    # Far inputs are clipped at ten standard deviations, actions at one.
-    np.testing.assert_array_equal(actions[1], [1, 1])
-    weak = PolicyNetwork(hand.mean, hand.variance, ((np.array([[0.05, 0.0]], np.float32), np.zeros(1, np.float32)),))
-    np.testing.assert_allclose(weak.actions(seen)[:, 0], [0.025, 0.5], rtol=1e-6)
-    assert actions.dtype == np.float32
 
 
 def unit(torch_unit, hidden, inputs, outputs, seed=0):

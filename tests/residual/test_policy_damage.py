@@ -10,14 +10,7 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from tests.residual.policies import ENVIRONMENT, INPUTS, POLICIES, SETTINGS, Trap, network, policy
-
-
-@pytest.fixture
-def folder(tmp_path):
-    save_policy(policy(), tmp_path / "policy")
-    return tmp_path / "policy"
-
+from tests.residual.policies import ENVIRONMENT, INPUTS, POLICIES, SETTINGS, Trap, network
 
 either = pytest.mark.parametrize("kind", POLICIES)
 

@@ -15,13 +15,6 @@ from agents.policy.files import FORMAT, WEIGHTS, load_policy, save_policy
 from tests.console import ROOT
 from tests.residual.policies import ENVIRONMENT, POLICIES, network, policy
 
-
-@pytest.fixture
-def folder(tmp_path):
-    save_policy(policy(), tmp_path / "policy")
-    return tmp_path / "policy"
-
-
 KINDS = {**POLICIES, "squashed": policy(squashed=True), "eleven layers": policy(hidden=(5,) * 10)}
 """Sorted as text, layer 10 comes before layer 2."""
 
@@ -41,20 +34,11 @@ def test_a_round_trip_is_exact(tmp_path, written):
             np.testing.assert_array_equal(one, other, strict=True)
 
 
-def about_as_others_read_it(path):
-    """The JSON in the header, as any reader of safetensors finds it."""
-
-    def refuse(word):
-        raise AssertionError(f"{word} is no JSON")
-
-    with safe_open(path, framework="numpy") as file:
-        return json.loads(file.metadata()["birthsim"], parse_constant=refuse)
-
-
 def test_others_read_arrays_and_json(tmp_path):
     """Some figures say nothing, hunting where the reference never rests; JSON has no word for NaN but null."""
     save_policy(replace(policy(), training={"reached": {"hunting_mm": float("nan")}}), tmp_path)
-    about = about_as_others_read_it(tmp_path / WEIGHTS)
+    with safe_open(tmp_path / WEIGHTS, framework="numpy") as file:
+        about = json.loads(file.metadata()["birthsim"], parse_constant=pytest.fail)
     assert about["training"]["reached"]["hunting_mm"] is None
     assert (about["format"], about["environment"], len(about["sha256"])) == (FORMAT, ENVIRONMENT, 64)
     np.testing.assert_array_equal(load((tmp_path / WEIGHTS).read_bytes())["mean"], network().mean)

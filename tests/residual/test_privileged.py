@@ -2,7 +2,6 @@
 
 import gymnasium
 import numpy as np
-import pytest
 
 from agents.residual.privileged import FIGURES, acting, true_figures, with_figures
 from birthsim_env.parts.drawn.randomization import documented_ranges
@@ -11,26 +10,18 @@ from birthsim_env.physics.rig.parameters import Parameters
 LANES = 64
 
 
-@pytest.fixture
-def make():
-    made = []
-
-    def one(**arguments):
-        made.append(gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=LANES, **arguments))
-        made[-1].reset(seed=5)
-        return made[-1]
-
-    yield one
-    for env in made:
-        env.close()
+def make(**arguments):
+    env = gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=LANES, **arguments)
+    env.reset(seed=5)
+    return env
 
 
-def test_as_described_nothing_is_special(make):
+def test_as_described_nothing_is_special():
     figures = true_figures(make(sensors="lab"))
     np.testing.assert_array_equal(figures, np.tile([1.0] * (FIGURES - 6) + [0.0] * 6, (LANES, 1)).astype(np.float32))
 
 
-def test_every_figure_of_the_rig_that_is_drawn_is_told(make):
+def test_every_figure_of_the_rig_that_is_drawn_is_told():
     nominal, ranges = Parameters(), documented_ranges(Parameters())
     figures = true_figures(make(randomize="plant")).T[:-6]
     names = (
@@ -45,7 +36,7 @@ def test_every_figure_of_the_rig_that_is_drawn_is_told(make):
         assert np.ptp(row) > 0.8 * (high - low), name
 
 
-def test_the_errors_of_honest_sensors_are_told(make):
+def test_the_errors_of_honest_sensors_are_told():
     rig = Parameters().replace({f"electronics.{name}": 0.0 for name in ("position_noise", "pressure_noise", "missed_periods")})
     rig = rig.replace({"electronics.adc_bits": 0.0})
     env = make(sensors="honest", parameters=rig)
@@ -57,7 +48,7 @@ def test_the_errors_of_honest_sensors_are_told(make):
     assert (np.ptp(figures, axis=1) > 0.5).all()
 
 
-def test_only_a_privileged_policy_is_told(make):
+def test_only_a_privileged_policy_is_told():
     env = make(randomize=True)
     seen = np.zeros((LANES, 4), np.float32)
     for privileged, length in ((False, 4), (True, 4 + FIGURES)):

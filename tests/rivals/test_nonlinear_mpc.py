@@ -4,20 +4,19 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessTest, run_stiffness_test
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.horizon import FLOWS, HALF, NODES, SIZE, Situation, programme
 from baselines.rivals.predictive import Constants, improve
 from baselines.rivals.quadratic import minimise, slope
-from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_columns
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.comparison.grid import default_controllers
+from tests.contracts.test_controllers import recorded
 from tests.controllers.test_informed import Aware
-from tests.controllers.test_through_friction import recorded
-from tests.controllers.test_valve_inverse import into_chambers
 from tests.oracles import closed_loop, derived_law, rigid_body
 
 RIG = Parameters()
@@ -153,14 +152,11 @@ def test_tolerances_are_the_gains_of_their_names() -> None:
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_what_is_known_makes_the_plan_and_its_first_flow_the_openings(sensors: str) -> None:
-    """State and forecasts of an estimator of its own, flows and bounds of the second model of the valves; lane by lane.
-
-    The plan stays as the mean that it has over each step one period later.
-    """
+    """By another estimator and the second model's valves. The plan stays as its mean over each step one period later."""
     controller, about, lanes = NonlinearMPC(RIG), constants(sensors), 2
     knowing = Aware(RIG, NonlinearMPC.TUNED, about.horizon)
     plan = np.zeros((SIZE, lanes))
-    for measured, wanted in recorded(lanes, 30, sensors):
+    for measured, wanted, _ in recorded(AdmittanceController(RIG, learn=False), sensors, RIG, lanes, 60)[0]:
         wanted.rows[12:14] = [[300.0, -200.0], [-150.0, 400.0]]
         openings = controller.command(measured, wanted)
         now = knowing.now(measured, wanted)
@@ -201,8 +197,7 @@ def later(plan: Array, steps: Array) -> Array:
 def test_short_pushes_through_friction(
     monkeypatch: pytest.MonkeyPatch, sensors: str, rest: float, hold: float, close: float, still: float
 ) -> None:
-    """Three poses, also a coupled setpoint, pushes of 9 to 20 N against pistons of 12 and 15 N. Measured: 0.07 %, 0.007 mm;
-    with a tracker's noise of 0.1 mm at 240 Hz 1.5 %, 0.1 mm."""
+    """9 to 20 N against pistons of 12 and 15 N, measured: 0.07 %, 0.007 mm; with a tracker's noise 1.5 %, 0.1 mm."""
     closed_loop.shorten_probes(monkeypatch, rest, 0.1, hold, 0.1)
     cases = [(0.5, 0.0, 20, 0, 2000, 2000, 0), (0.4, 0.05, 0, -15, 1500, 3000, 500), (0.62, -0.1, -8, 5, 3500, 3500, 0)]
     columns = np.array(cases).T.copy()
@@ -211,54 +206,6 @@ def test_short_pushes_through_friction(
     assert not answers.lost.any()
     assert np.abs(answers.stiffness_error(own.force)).max() < close
     assert answers.hunting.max() < still
-
-
-def test_a_circle_with_pneumatic_stiffness_that_changes() -> None:
-    """One turn a second, radius 4 cm, without dry friction: within 0.05 mm and 1 % of the pneumatic stiffness after 0.2 s."""
-    rig, errors, stiff = closed_loop.FRICTIONLESS, [], []
-    controller, swing = NonlinearMPC(rig), np.array([[400.0], [200.0]])
-
-    def reference(time: float) -> Reference:
-        wanted = closed_loop.circling(time, 0.04, 1.0, 2000.0)
-        wanted.rows[10:12] += swing * np.sin(8 * time)
-        wanted.rows[12:14] = swing * 8 * np.cos(8 * time)
-        return wanted
-
-    plant, still = closed_loop.resting_at(reference(0.0), rig), np.zeros((2, 1))
-    for time, wanted, _, _ in closed_loop.run(plant, controller.command, reference, lambda t: still, 0.5):
-        if time > 0.2:
-            errors.append(np.hypot(*(plant.end_effector()[:2] - wanted.position))[0])
-            stiff.append(stiffness_of(plant) / wanted.pneumatic_stiffness[:, 0] - 1)
-    assert max(errors) < 5e-5
-    assert np.abs(stiff).max() < 0.01
-
-
-def stiffness_of(plant: Plant) -> Array:
-    """(9) of both cylinders, N/m."""
-    found = []
-    for i, cylinder in enumerate((RIG.cylinder1, RIG.cylinder2)):
-        half, y = cylinder.stroke / 2, plant.piston[i, 0]
-        each = plant.pressures[2 * i : 2 * i + 2, 0] * derived_law.areas(cylinder) / [half + y, half - y]
-        found.append(RIG.air.polytropic_index * each.sum())
-    return np.array(found)
-
-
-def test_a_lane_without_numbers_is_left_alone() -> None:
-    """Until it is reset no more flows than leaks through shut valves; the others notice nothing."""
-    record, kept, blind = recorded(3, 12, "ideal"), NonlinearMPC(RIG), NonlinearMPC(RIG)
-    for tick, (measured, wanted) in enumerate(record):
-        fields = {name: np.array(value) for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
-        if tick in (3, 4):
-            fields["position"][:, 2] = np.nan
-        expected, got = kept.command(measured, wanted), blind.command(Measurement(**fields, sampled=False), wanted)
-        assert np.array_equal(got[:, :2], expected[:, :2])
-        if 3 <= tick <= 6:
-            leaks = np.abs(into_chambers(RIG, measured.pressures, np.zeros((4, 3))))
-            assert np.all(np.abs(into_chambers(RIG, measured.pressures, got)) <= leaks + 1e-15, axis=0)[2]
-        if tick == 6:
-            blind.reset(np.array([False, False, True]))
-        assert np.isfinite(got).all()
-        assert np.abs(got).max() <= 1
 
 
 def test_it_comes_back_from_an_end_stop() -> None:

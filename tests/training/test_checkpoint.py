@@ -37,12 +37,6 @@ def new(algorithm="ppo", seed=0):
     return make_model(replace(TINY, algorithm=algorithm, seed=seed), env), env
 
 
-def learned(algorithm="ppo", steps=300):
-    model, env = new(algorithm)
-    model.learn(steps)
-    return model, env
-
-
 def test_a_damaged_checkpoint_is_refused_and_nothing_is_unpickled(tmp_path):
     model, env = new()
     path, trap = tmp_path / NAME, tmp_path / "sprung"

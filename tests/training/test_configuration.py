@@ -16,11 +16,13 @@ from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 
+RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))
 
-def test_there_is_a_configuration_for_every_scenario():
-    assert set(SCENARIOS) <= set(configuration_names())
+
+def test_there_is_a_configuration_for_every_scenario_in_both_files():
     for name in SCENARIOS:
         assert load_configuration(name)[0].environment == environment_id(name, "Residual")
+    assert set(RL_ZOO) == {environment_id(name, "Residual") for name in SCENARIOS}
 
 
 @pytest.mark.parametrize("name", configuration_names())
@@ -64,13 +66,6 @@ def test_a_file_of_ones_own_says_only_what_differs(tmp_path):
     assert load_configuration("probe")[0].steps != 7
 
 
-RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))
-
-
-def test_rl_zoos_file_has_every_scenario():
-    assert set(RL_ZOO) == {environment_id(name, "Residual") for name in SCENARIOS}
-
-
 @pytest.mark.parametrize("name", sorted(SCENARIOS))
 def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
     training, residual = load_configuration(name)
@@ -100,14 +95,11 @@ MASSES, SLOWEST = (2.0, 5.0), 0.008
 """kg; s: what ``Mechanics.mass`` and ``Valves.time_constant`` document."""
 
 
-def test_ranges_reach_further_on_one_side() -> None:
+def test_ranges_reach_further_on_one_side_and_an_owners_own_count() -> None:
     known, wide = documented_ranges(Parameters()), documented_ranges(widened(Parameters(), 0.5))
     assert wide["mechanics.mass"] == pytest.approx((MASSES[0] / 1.5, MASSES[1]))
     assert wide["valves.time_constant"] == pytest.approx((0.0015, 1.5 * SLOWEST))
     assert {name for name in known if wide[name] == known[name]} == {"chambers.dead_volume", "chambers.wall_heat_transfer"}
-
-
-def test_an_owners_own_ranges_count() -> None:
     rig = Parameters.from_dict({"randomize": {"mechanics.mass": [7.0, 10.0], "air.supply_pressure": [6e5, 7e5]}})
     ranges = documented_ranges(widened(rig, 0.25))
     assert ranges["mechanics.mass"] == (7.0 / 1.25, 10.0)

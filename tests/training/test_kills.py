@@ -11,13 +11,14 @@ import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
-from agents.training import reached
+from agents.training import policy_gradient, reached
 from agents.training.checkpoint import NAME
 from agents.training.sb3 import monitor
 from agents.training.sb3.checkpoint import save_checkpoint
 from agents.training.trainer import train
 from tests.console import PATIENCE, ROOT, run, strict
 from tests.training.brief import TINY, steady
+from tests.training.test_policy_gradient import BESIDE, INFORMED, PURE, SHORT
 
 RESIDUAL = ResidualSettings("backstepping-force-first", "variable_kp")
 
@@ -26,7 +27,7 @@ class Killed(Exception):
     """Nobody catches it."""
 
 
-def killed(monkeypatch, settings, folder, place, name, count):
+def killed(monkeypatch, settings, residual, folder, place, name, count):
     """Train until a method of the monitor is entered, or a file is written, for the ``count``-th time."""
     calls, own = [], getattr(place, name)
 
@@ -39,37 +40,44 @@ def killed(monkeypatch, settings, folder, place, name, count):
     with monkeypatch.context() as patch:
         patch.setattr(place, name, die)
         with pytest.raises(Killed):
-            train(settings, RESIDUAL, folder)
+            train(settings, residual, folder)
 
 
 STEP, CHECK, ROLLOUT = ((monitor.Monitor, name) for name in ("_on_step", "_check", "_on_rollout_start"))
 FILES = [(monitor, "save_checkpoint", 2), (reached, "save_policy", 2)]
 SLOW = pytest.mark.slow
+UPDATE = (policy_gradient.PolicyGradient, "_update", 60)
+"""Some way beyond the validation half way."""
+SAC = replace(TINY, algorithm="sac", steps=384)
+LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v1")
 
 
 @pytest.mark.parametrize(
-    ("changes", "places"),
+    ("settings", "residual", "places"),
     [
-        pytest.param({}, [(*STEP, 1), (*STEP, 127), (*CHECK, 2), (*ROLLOUT, 5), *FILES], marks=SLOW, id="ppo"),
-        pytest.param({}, [(*STEP, 70), (*CHECK, 5)], id="ppo, two deaths"),
-        pytest.param({"sensors": "lab", "environment": "BirthSIM/CircleResidual-v1"}, [(*CHECK, 5)], marks=SLOW, id="ppo lab"),
+        pytest.param(TINY, RESIDUAL, [(*STEP, 1), (*STEP, 127), (*CHECK, 2), (*ROLLOUT, 5), *FILES], marks=SLOW, id="ppo"),
+        pytest.param(TINY, RESIDUAL, [(*STEP, 70), (*CHECK, 5)], id="ppo, two deaths"),
+        pytest.param(LAB, RESIDUAL, [(*CHECK, 5)], marks=SLOW, id="ppo lab"),
         # The first 160 steps are drawn from the space of actions.
-        pytest.param({"algorithm": "sac", "steps": 384}, [(*STEP, 10), (*STEP, 40), (*CHECK, 4)], marks=SLOW, id="sac"),
-        pytest.param({"algorithm": "tqc", "steps": 256}, [(*STEP, 30)], marks=SLOW, id="tqc"),
+        pytest.param(SAC, RESIDUAL, [(*STEP, 10), (*STEP, 40), (*CHECK, 4)], marks=SLOW, id="sac"),
+        pytest.param(replace(TINY, algorithm="tqc", steps=256), RESIDUAL, [(*STEP, 30)], marks=SLOW, id="tqc"),
+        pytest.param(SHORT, PURE, [UPDATE], marks=SLOW, id="apg"),
+        pytest.param(BESIDE, INFORMED, [UPDATE], marks=SLOW, id="apg, informed"),
     ],
 )
 @pytest.mark.usefixtures("short_probe")
-def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(tmp_path, monkeypatch, capsys, changes, places):
+def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(
+    tmp_path, monkeypatch, capsys, settings, residual, places
+):
     """The checkpoint holds the best policy: whichever file is the newer one, the training ends as it would have."""
-    settings = replace(TINY, **changes)
-    expected = train(settings, RESIDUAL, tmp_path / "whole")
+    expected = train(settings, residual, tmp_path / "whole")
     policy = (tmp_path / "whole" / WEIGHTS).read_bytes()
     for k, place in enumerate(places):
         folder = tmp_path / str(k)
-        killed(monkeypatch, settings, folder, *place)
+        killed(monkeypatch, settings, residual, folder, *place)
         (folder / WEIGHTS).unlink(missing_ok=True)
         capsys.readouterr()
-        ended = train(settings, RESIDUAL, folder)
+        ended = train(settings, residual, folder)
         assert "steps are there and are kept" in capsys.readouterr().out
         assert (folder / WEIGHTS).read_bytes() == policy
         assert steady(ended["curve"]) == steady(expected["curve"])

@@ -103,14 +103,6 @@ def test_attributes_are_read_for_the_lanes_asked_for_and_never_set():
     assert env.env_is_wrapped(Monitor, [1]) == [False]
 
 
-@pytest.mark.parametrize("mode", ["sync", "async"])
-def test_a_vector_environment_that_resets_one_step_later_is_refused(mode):
-    env = gymnasium.make_vec("CartPole-v1", num_envs=2, vectorization_mode=mode)
-    with pytest.raises(ValueError, match="allowed: one made with autoreset_mode='SameStep'"):
-        SB3VecEnv(env)
-    env.close()
-
-
 def test_frames_come_from_the_lanes(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     env = adapted(RESIDUAL, lanes=2, render_mode="rgb_array")

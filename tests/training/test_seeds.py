@@ -5,7 +5,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 from scipy import stats
@@ -20,8 +19,6 @@ from agents.residual.law import observation_names
 from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
-from baselines.registry import make_controller
-from birthsim_env.physics.rig.parameters import Parameters
 from studies.scores.study import _contestants
 
 
@@ -124,20 +121,6 @@ def test_shipped_policies_load_fit_and_are_small(name):
         assert training["policy"]["pooled_mm"] == policy.training["reached"]["pooled_mm"]
     reached = [load_policy(place).training["reached"]["pooled_mm"] for place in places]
     assert best_policy(name) == places[int(np.argmin(reached))]
-
-
-def test_a_policy_without_a_force_sensor_ignores_what_the_environment_measures():
-    """``--policy circle_honest_student`` in an environment with a force sensor."""
-    law = make_controller("residual", Parameters(), policy="circle_honest_student")
-    port = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors="honest", policy_period=0.001)
-    port.reset(seed=0)
-    asked = []
-    for lie in (0.0, 50.0):
-        law.reset()
-        seen = replace(port.measurement, user_force=np.full((2, 2), lie))
-        asked.append(law.command(seen, port.reference))
-    np.testing.assert_array_equal(*asked)
-    port.close()
 
 
 @pytest.mark.parametrize(("sensors", "said"), [("honest", False), ("lab", True)])

@@ -207,6 +207,7 @@ def test_every_range_can_be_drawn_and_none_is_unless_it_is_named():
     nominal = Parameters()
     assert checked_ranges(WORTH, nominal, "honest") == WORTH
     assert not set(WORTH) & set(documented_ranges(nominal, "honest"))
+    assert "deadband" not in nominal.to_dict()["valves"], "no stored rig changes"
     assert options.are_off(Plant().lane_parameters)
     assert Parameters.from_dict(nominal.replace(EACH["all"]).to_dict()) == nominal.replace(EACH["all"])
 

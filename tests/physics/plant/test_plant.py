@@ -74,9 +74,7 @@ print(*kernel.inspect_asm().values())
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instruction names")
 def test_kernel_is_vectorised() -> None:
-    """Each division and root stands there twice, packed and for leftover lanes; scalar code would have no packed ones.
-
-    The right-hand side is compiled for AVX2, and not run, whatever this processor can do."""
+    """Compiled for AVX2: each division and root stands there packed and, for leftover lanes, scalar."""
     target = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+sse,+sse2,+sse4.1,+sse4.2,+avx,+avx2"}
     line = [sys.executable, "-c", DISASSEMBLE]
     done = subprocess.run(line, cwd=ROOT, env={**os.environ, **target}, capture_output=True, text=True, check=True)

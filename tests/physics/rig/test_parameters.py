@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
-from birthsim_env.physics.rig.parameters import Cylinder, Parameters, field_of, load_parameters
+from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from tests.physics.rigs import LAWS
 
 FIELDS = [
@@ -77,15 +77,6 @@ def test_what_is_no_number_is_refused_by_the_name_of_every_field(value: Any) -> 
             Parameters().replace({f"{section}.{field.name}": value})
         if not field.metadata["choices"]:
             assert f"({field.metadata['unit']})" in str(error.value)
-
-
-def test_replace_changes_what_it_names_only() -> None:
-    rig = Parameters().replace({"mechanics.mass": 4.0, "cylinder2.coulomb_friction": 20.0})
-    assert rig == dataclasses.replace(
-        Parameters(),
-        mechanics=dataclasses.replace(Parameters().mechanics, mass=4.0),
-        cylinder2=Cylinder(stroke=0.4, coulomb_friction=20.0),
-    )
 
 
 @settings(max_examples=25)
