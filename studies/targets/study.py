@@ -119,7 +119,7 @@ def _threads(rig: Parameters) -> Result:
     loops = [("circle", *loop) for loop in LOOPS]
     with tempfile.TemporaryDirectory() as place:
         folder, lines = Path(place), list[Any]()
-        build_threads(loops, rig, 0, None, folder)
+        build_threads(loops, rig, None, folder)
         sizes = {path.name: path.stat().st_size for path in sorted(folder.iterdir()) if path.suffix in (".ptx", ".bin")}
         for rows, case in zip(thread_rows(loops, rig, folder, PERIODS), (_loop(*loop) for loop in loops), strict=True):
             period = first_difference(rows[:, case.rows], case.python()[1])
