@@ -47,7 +47,7 @@ def test_it_trains_all_the_steps_it_was_asked_for(trained):
     assert np.isfinite(trained["loss"].item())
 
 
-def test_its_agent_is_better_than_before(trained, mean_return):
+def test_its_agent_is_better_than_five_untrained_ones(trained, mean_return):
     env = trained["envs"].envs[0]
     while not isinstance(env, gym.wrappers.NormalizeObservation):
         env = env.env
@@ -61,9 +61,11 @@ def test_its_agent_is_better_than_before(trained, mean_return):
 
         return act
 
-    torch.manual_seed(1)
-    untrained = mean_return(policy(trained["Agent"](trained["envs"])))
-    assert mean_return(policy(trained["agent"])) > untrained + 200, untrained
+    def untrained(seed):
+        torch.manual_seed(seed)
+        return trained["Agent"](trained["envs"])
+
+    assert mean_return(policy(trained["agent"])) > max(mean_return(policy(untrained(seed))) for seed in range(5))
 
 
 def test_the_example_trains_and_prints_scores(example):
