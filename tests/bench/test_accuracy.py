@@ -37,7 +37,6 @@ def test_the_plants_own_step_errs_far_less_than_a_tracker():
 
 @pytest.fixture(scope="module")
 def found():
-    """A small measurement, as JSON gives it back."""
     patch = pytest.MonkeyPatch()
     with patch.context() as short:
         for name, value in (("TOLERANCES", (1e-4,)), ("ADAPTIVE", ("RK45", "DOP853", "Radau")), ("LAWS", ("lugre",))):

@@ -50,7 +50,6 @@ def assert_equal(one, other):
 
 
 def assert_same_refusal(words, *runs):
-    """Of the native environment, and of the one on a device."""
     said = []
     for run in runs:
         with pytest.raises(ValueError, match=words) as refused:

@@ -37,7 +37,6 @@ def command(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def records(command):
-    """The four runs: controller and sensors -> record."""
     others = (("backstepping", "lab"), ("backstepping-weight", "ideal"), ("backstepping-weight", "lab"))
     return {("backstepping", "ideal"): command[1], **{setting: record_run(*setting) for setting in others}}
 

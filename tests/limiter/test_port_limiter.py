@@ -20,8 +20,6 @@ KX, MASS = 2000.0, 4.0
 
 
 class Full:
-    """A law that opens everything."""
-
     def command(self, measurement, reference):
         return np.ones((4, measurement.position.shape[1]))
 

@@ -66,7 +66,6 @@ class Told(NamedTuple):
     settings: dict[str, Any]
 
     def of(self, name):
-        """A field of the last row."""
         return self.row[-1, SLICES[name]]
 
 
