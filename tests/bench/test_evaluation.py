@@ -154,19 +154,6 @@ def test_a_lane_that_terminates_is_lost_and_stops_contributing(sensors):
     assert np.isnan(trace[seen:, 1]).all()
 
 
-def test_a_lost_episode_counts_as_infinitely_bad_though_its_own_figures_end_with_it():
-    # Lost in the first half second, the lane runs 6.5 s of another episode, whose push must not be measured.
-    result = run(Slam(lanes=(0,), begins=0.0), episodes=2, duration=7.0)
-    assert result.lost == [True, False]
-    summary = result.summary()
-    for name in ("stiffness_error", "cross_motion", "hunting_x", "settled_max_x"):
-        assert math.isnan(result.metrics[name][0]), name
-        assert math.isfinite(result.metrics[name][1]), name
-        assert summary[name]["median"] == summary[name]["max"] == math.inf
-    assert math.isfinite(result.metrics["air"][0])
-    assert summary["air"]["q95"] == math.inf
-
-
 def test_nothing_runs_on_once_every_lane_is_lost():
     result = run(spy := Spy(Slam(lanes=(0, 1))), episodes=2, duration=7.0)
     assert result.lost == [True, True]

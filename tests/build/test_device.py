@@ -89,19 +89,6 @@ def test_lanes_that_wait_begin_where_they_are_told():
 
 
 @pytest.mark.slow
-def test_two_devices_are_one():
-    whole, parts = made("host", lanes=7), [made("host", lanes=n) for n in (3, 4)]
-    whole.reset(seed=SEED)
-    for env, first in zip(parts, (0, 3), strict=True):
-        env.reset(seed=[SEED + first + k for k in range(env.num_envs)])
-    actions = np.random.default_rng(3).uniform(-1.0, 1.0, (7, 4))
-    for _ in range(3):
-        together, *_ = whole.step(actions)
-        apart = [env.step(given)[0] for env, given in zip(parts, np.split(actions, [3]), strict=True)]
-        assert_equal(together, np.concatenate(apart))
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("device", ["host", "cuda"])
 @pytest.mark.parametrize("row", fingerprints.rows())
 def test_the_stored_fingerprints(row, device):

@@ -13,6 +13,7 @@ from agents.training.configuration import TrainingSettings, override
 from baselines import AdmittanceController, BacksteppingController, evaluate, make_controller
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals.symbolic import symbolic_model
+from birthsim_build.code import ptx
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
@@ -218,6 +219,7 @@ TABLE = [
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
     (partial(Renderer(RIG, 320, 240).show, None), "frames_per_second", (0.0, -1.0, NAN, INF), ""),
+    (partial(ptx.assemble, "code.ptx", "code.cubin"), "gpu", ("h100",), "sm_"),
     (symbolic_model, "algebra", ("maple",), "'sympy', 'casadi'"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),
 ]  # fmt: skip

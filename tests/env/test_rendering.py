@@ -243,8 +243,8 @@ SCRIPT = """
 import sys
 import numpy as np
 import birthsim_env.env, birthsim_env.vector_env
-from birthsim_env.physics.rig.parameters import Parameters
 assert "pygame" not in sys.modules, "importing must not load pygame"
+from birthsim_env import Parameters
 import birthsim_env.drawing.rendering as rendering
 scene = rendering.Scene(0.0, (0.0, 0.0), (0.5, 0.0), (0.5, 0.0), (0.0, 0.0), (2e5,) * 4, (1.0, 1.0), np.zeros((0, 2)))
 rendering.Renderer(Parameters()).frame(scene)
