@@ -41,7 +41,6 @@ class Out(Held):
 
 
 def words(command):
-    """What a process or ``sys.argv`` begins with."""
     return ["birthsim", "study", command] if command in STUDIES else ["birthsim", command]
 
 

@@ -75,7 +75,6 @@ def _inside(text: Text, figure: Figure) -> bool:
 
 
 def _colours(figure: Figure) -> set[object]:
-    """Of lines and marks; bands and rules, which have an alpha, only accompany them."""
     found: set[object] = set()
     for axes in figure.axes:
         found |= {line.get_color() for line in axes.get_lines() if line.get_alpha() is None}

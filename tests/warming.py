@@ -37,18 +37,15 @@ def stages() -> list[str]:
 
 
 def warm(name: str) -> None:
-    """Compile a stage, or load it."""
     module, _, function = name.partition(":")
     address_of(getattr(import_module(module), function))
 
 
 def plant() -> None:
-    """Compile what most tests of physics call first."""
     Plant(Parameters(), 1).advance(np.zeros((4, 1)), np.zeros((2, 1)), 0.001)
 
 
 def main() -> None:
-    """Compile them side by side, in children that have all imports of this process."""
     found = stages()
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
         alone = pool.submit(plant)

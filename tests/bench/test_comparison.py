@@ -81,9 +81,7 @@ def test_a_metric_applies_where_any_controller_says_something_of_it(figures):
     assert "stiffness_error" in at(figures, REFERENCE, PROBE)["metrics"]
     assert not any("stiffness_error" in at(figures, name, CIRCLE)["metrics"] for name in (REFERENCE, "other", "worst"))
     assert "cross_motion" not in at(figures, REFERENCE, PROBE)["metrics"]
-
-
-def test_errors_apply_even_where_every_episode_is_lost_before_there_are_any():
+    # Errors apply even where every episode is lost before there are any.
     (only,) = statistics(gather({("worst", CIRCLE): result((True, True, True))}))
     assert only["metrics"]["settled_rms"]["median"] == INF
     assert "hunting" not in only["metrics"]

@@ -69,8 +69,7 @@ def test_a_seed_means_the_same_world_in_every_batch_and_for_a_law_that_was_used_
     batches = run(law, **arguments)
     assert [trace.shape[1] for trace in batches.traces] == [2, 2, 1]
     assert together.seeds == batches.seeds == [5, 6, 7, 8, 9]
-    for name in UNITS:
-        np.testing.assert_array_equal(together.metrics[name], batches.metrics[name], err_msg=name)
+    np.testing.assert_equal(together.metrics, batches.metrics)
     assert not set(together.metrics["error_rms_x"]) & set(run(law, seed=50, **arguments).metrics["error_rms_x"])
 
 
@@ -132,8 +131,7 @@ def test_a_lane_that_terminates_is_lost_and_stops_contributing(sensors):
     assert calm.lost == [False] * 3
     assert slammed.lost == [False, True, False]
     for name in UNITS:
-        for lane in (0, 2):
-            np.testing.assert_array_equal(slammed.metrics[name][lane], calm.metrics[name][lane], err_msg=name)
+        np.testing.assert_array_equal(slammed.metrics[name][::2], calm.metrics[name][::2], err_msg=name)
     # The lost lane's figures are those of its episode alone, up to the end.
     env = gymnasium.make_vec(PROBE, num_envs=1, policy_period=1e-3, duration=0.8, randomize=True, sensors=sensors)
     _, info = env.reset(seed=[6])
@@ -154,19 +152,6 @@ def test_a_lane_that_terminates_is_lost_and_stops_contributing(sensors):
     assert np.isnan(trace[seen:, 1]).all()
 
 
-def test_a_lost_episode_counts_as_infinitely_bad_though_its_own_figures_end_with_it():
-    # Lost in the first half second, the lane runs 6.5 s of another episode, whose push must not be measured.
-    result = run(Slam(lanes=(0,), begins=0.0), episodes=2, duration=7.0)
-    assert result.lost == [True, False]
-    summary = result.summary()
-    for name in ("stiffness_error", "cross_motion", "hunting_x", "settled_max_x"):
-        assert math.isnan(result.metrics[name][0]), name
-        assert math.isfinite(result.metrics[name][1]), name
-        assert summary[name]["median"] == summary[name]["max"] == math.inf
-    assert math.isfinite(result.metrics["air"][0])
-    assert summary["air"]["q95"] == math.inf
-
-
 def test_nothing_runs_on_once_every_lane_is_lost():
     result = run(spy := Spy(Slam(lanes=(0, 1))), episodes=2, duration=7.0)
     assert result.lost == [True, True]
@@ -180,8 +165,7 @@ def test_an_interrupt_keeps_the_episodes_that_are_complete(monkeypatch, capsys, 
     whole, cut = run(Spy(), episodes=6, duration=0.2), run(Spy(interrupt_at=at), episodes=6, duration=0.2)
     assert cut.seeds == whole.seeds[:complete]
     assert cut.lost == whole.lost[:complete]
-    for name in UNITS:
-        np.testing.assert_array_equal(cut.metrics[name], whole.metrics[name][:complete], err_msg=name)
+    np.testing.assert_equal(cut.metrics, {name: values[:complete] for name, values in whole.metrics.items()})
     assert len(cut.traces) == complete // 2
     assert math.isfinite(cut.cost)
     assert f"{complete} of 6 episodes" in capsys.readouterr().out

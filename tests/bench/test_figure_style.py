@@ -19,7 +19,6 @@ from tests.figures import caught, contrast
 
 
 def record():
-    """A run of Fig. 4, and rows of an episode."""
     time = np.linspace(0, 16, 65)
     way = np.stack([np.cos(time), np.sin(time)], axis=1)
     pairs = {"user_force": 30.0, "target": 0.05, "compliant_target": 0.05, "position": 0.051, "tracking_error": 1e-3}

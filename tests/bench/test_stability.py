@@ -47,7 +47,6 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path, monkeypatch):
 
 
 def test_how_far_all_is_stable():
-    """Up to the first cell that is not, whatever comes behind it."""
     rows = [[True, True, True], [True, False, True], [False, True, True]]
     chart = {"x": {"values": [1.0, 2.0, 3.0]}, "variants": {"a": {"stable": rows}}}
     assert stable_up_to(chart, "a") == [3.0, 1.0, None]
@@ -55,7 +54,6 @@ def test_how_far_all_is_stable():
 
 @pytest.mark.slow
 def test_the_command(tmp_path, monkeypatch, capsys):
-    """Files, strict JSON, and a table with the numbers of the maps."""
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)
     out = tmp_path / "deeper" / "maps"

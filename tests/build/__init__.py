@@ -1,1 +1,0 @@
-"""The code that needs no Python, beside Python."""

@@ -52,7 +52,6 @@ def need_threads():
 
 
 def need_device(name):
-    """Skip where there is no such device."""
     try:
         machine_named(name)
     except ValueError as missing:
@@ -60,7 +59,6 @@ def need_device(name):
 
 
 def build(target, out, *options, command=loops):
-    """The command, in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["birthsim export", "--to", target, *map(str, options), "--out", str(out)])
         perform_with("birthsim export", command.Settings, command.main, "")

@@ -57,7 +57,6 @@ def flat(tape, lanes):
 
 
 def back_here(made, bars):
-    """What ``TapedLoop`` makes of bars over the last policy step."""
     (tape, periods, rig), found = made.recorder._last, bars.copy()
     made.recorder.loop.back(periods, tape, rig, found)
     return found

@@ -111,7 +111,6 @@ def test_what_no_device_draws_is_refused_by_name():
 
 @pytest.mark.parametrize("case", ["circle honest", "nothing drawn"])
 def test_stages_begin_a_block_as_a_simulation_does(case):
-    """The stages alone, over a block of lanes here."""
     scenario, arguments = CASES[case]
     lanes = 5
     episodes = Episodes(assemble(lanes, scenario, **{"randomize": True, **arguments}))

@@ -53,7 +53,6 @@ def on_aarch64(aarch64):
 
 @pytest.fixture(params=["in_node", "in_c"])
 def rows_of(request):
-    """Rows of a built loop, by its name in C."""
     return request.getfixturevalue(request.param)
 
 
@@ -98,7 +97,6 @@ OPTIONS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
 def test_the_plant_with_options(tmp_path, options):
-    """Worn valves, tubes, a supply that droops and a structure that bends."""
     need_linker()
     if HOST is None:
         pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")

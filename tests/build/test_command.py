@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from birthsim_build.code import ptx, threads
+from birthsim_build.code import threads
 from tests.console import call
 
 LACKS = [
@@ -65,8 +65,3 @@ def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
     assert about["rows"]["rig_mass"] == 8
     assert {"y1", "measured_x", "reward", "failed", "tracking_error1"} <= about["rows"].keys()
     assert max(about["rows"].values()) < words[threads.ROWS]
-
-
-def test_a_gpu_is_named_by_its_architecture(tmp_path):
-    with pytest.raises(ValueError, match="gpu = 'h100'; allowed: sm_"):
-        ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "h100")

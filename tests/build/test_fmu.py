@@ -68,7 +68,6 @@ class Unit:
 
 @pytest.fixture
 def unit():
-    """Makes instances, and ends them."""
     made = []
 
     def make(path, **parameters):
@@ -82,7 +81,6 @@ def unit():
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Makes FMU files with the command, each once."""
     need_linker()
     folder, made = tmp_path_factory.mktemp("fmu"), {}
 
@@ -280,7 +278,6 @@ def test_calls_out_of_turn_and_impossible_parameters_are_refused(written, unit, 
 
 
 def test_units_are_those_of_the_rig():
-    """Against the definitions of the derived units, each written out."""
     assert exponents("W/(m2 K)") == {"kg": 1, "s": -3, "K": -1}
     assert exponents("m3/(s Pa)") == {"m": 4, "s": 1, "kg": -1}
     assert exponents("N s/m") == {"kg": 1, "s": -1}

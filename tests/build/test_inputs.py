@@ -40,7 +40,6 @@ def test_another_law_takes_over(in_node, sensors):
 
 @pytest.fixture
 def loop(library):
-    """``advance`` of the library, and a loop of its as words."""
     advance, first = library_loop(library, "circle_lab_admittance_backstepping")
     return lambda words, periods: advance(words.ctypes.data, periods), first
 

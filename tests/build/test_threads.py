@@ -30,7 +30,6 @@ LOOKS = {"baselines.bench.measures:_see", "baselines.bench.measures:_pay"}
 
 
 def begun(lanes, scenario="circle", controller=None, **arguments):
-    """Lanes that begin, each drawn by its own seed."""
     if controller is not None:
         return controlled(scenario, arguments["sensors"], Parameters(), controller, SEED, lanes)
     episodes = Episodes(assemble(lanes, scenario, randomize=True, **arguments))
@@ -49,7 +48,6 @@ def both(lanes, **loop):
 
 
 def differing(pieces, made):
-    """Numbers of the arrays that differ in a bit."""
     pairs = enumerate(zip(made.views, pieces.arrays(), strict=True))
     return [k for k, (view, array) in pairs if view is not None and view.tobytes() != array.tobytes()]
 

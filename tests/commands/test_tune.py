@@ -24,7 +24,6 @@ BEST = (400.0, 0.6)
 
 @pytest.fixture
 def own(tmp_path):
-    """A controller in a file."""
     path = tmp_path / "own.py"
     path.write_text(OWN + TUNED)
     return f"{path}:Own"

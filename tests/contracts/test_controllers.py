@@ -59,7 +59,6 @@ def recorded(law, sensors, rig, lanes, ticks):
 
 
 def lane_of(signals, lane):
-    """Signals of one rig, without a lane axis, and what is told of it."""
     measured, wanted, given = signals
     told_of = {name: value[..., lane] for name, value in given.items()}
     return (closed_loop.of_lanes(measured, lane), Reference(wanted.rows[:, lane])), told_of

@@ -168,7 +168,6 @@ def test_a_reset_of_one_lane_leaves_the_others_alone(world):
 
 
 def saved(state):
-    """The state as a file brings it back."""
     file = io.BytesIO()
     np.savez(file, **state)
     file.seek(0)

@@ -13,6 +13,7 @@ from agents.training.configuration import TrainingSettings, override
 from baselines import AdmittanceController, BacksteppingController, evaluate, make_controller
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals.symbolic import symbolic_model
+from birthsim_build.code import ptx
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
@@ -21,6 +22,7 @@ from birthsim_env.parts.hands.moving_hands import Noise
 from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.vector_env import BirthSIMVectorEnv
+from tests.physics.rig.test_parameters import FIELDS
 
 CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
 NAN, INF = math.nan, math.inf
@@ -55,6 +57,12 @@ def options(**given):
 
 def rig(**given):
     return RIG.replace(given)
+
+
+def beyond(least, most, above, **_):
+    """Numbers that are too small or too large for a field of the rig."""
+    small = (above, least - 1e-3 * max(abs(least), 1e-3))
+    return [value for value in (*small, 1.001 * most) if math.isfinite(value)]
 
 
 def listed_option(controller, **given):
@@ -105,43 +113,20 @@ TABLE = [
     (partial(rig, **{"friction.law": "elasto_plastic"}), "mechanics.mass", (0.01,), "at least 0.0264 kg"),
     (partial(rig, **{"friction.law": "coulomb"}), "mechanics.mass", (1.0,), "or less friction"),
     (partial(rig, **{"mechanics.mode_frequency": 30.0}), "mechanics.mass", (0.03,), "or less friction"),
-    (rig, "mechanics.gravity", (-9.81,), ">= 0 and <= 100 (m/s2)"),
-    (rig, "mechanics.mode_frequency", (400.0,), "(Hz)"),
-    (rig, "mechanics.mode_mass_fraction", (1.0,), "(-)"),
     (rig, "friction.law", ("viscous",), "'lugre', 'coulomb', 'elasto_plastic'"),
-    (rig, "friction.breakaway_ratio", (0, 0.95), "> 0 and <= 0.9 (-)"),
-    (rig, "friction.static_ratio", (0.9,), "(-)"),
-    (rig, "cylinder1.stroke", (-0.2,), "(m)"),
     (rig, "cylinder2.rod_diameter", (0.025,), "less than piston_diameter"),
-    (rig, "valves.critical_ratio", (1.0,), ">= 0 and <= 0.9"),
-    (rig, "valves.time_constant", (1e-5,), "(s)"),
-    (rig, "valves.opening_limit", (1.2,), "(-)"),
     (rig, "air.supply_pressure", (1e5,), "more than atmospheric_pressure"),
-    (rig, "air.heat_capacity_ratio", (1,), "(-)"),
-    (rig, "air.supply_conductance", (-1e-9,), "(m3/(s Pa))"),
-    (rig, "air.supply_volume", (1e-6,), "(m3)"),
     (rig, "geometry.k2", (0.2,), "more than 0.22 m"),
     (rig, "geometry.k1", (0.5,), "cylinder 1's length"),
-    (rig, "chambers.dead_volume", (0,), "(m3)"),
     (rig, "chambers.dead_volume", (4e-6,), "at least 4.91e-06 m3"),
     (partial(rig, **{"cylinder2.piston_diameter": 0.05}), "chambers.dead_volume", (1e-5,), "at least 1.96e-05 m3"),
-    (rig, "chambers.tube_length", (20.0,), "(m)"),
-    (rig, "chambers.wall_heat_transfer", (1e6,), "<= 10000"),
-    (rig, "electronics.control_period", (0,), "(s)"),
     (rig, "electronics.transmitter_y", (0.0,), "another place"),
-    *(
-        (rig, f"electronics.acceleration_{name}", (-1.0, NAN, INF, 1e7), "a finite number")
-        for name in ("bandwidth", "noise", "bias", "gain_error")
-    ),
+    *((rig, f"{section}.{one.name}", beyond(**one.metadata), f"({one.metadata['unit']})") for section, one in FIELDS),
     (rig, "electronics.acceleration_bandwidth", (39.0,), "0, which is no sensor, or at least 40 Hz"),
     (named, "controller", ("backsteping",), "a registered name, or path/to/file.py"),
     (named, "controller", ("",), "backstepping, admittance, pid"),
     (gains, "stiffness", (1.0,), "gain, rest_gain, rest_push, "),
     (gains, "gain", (0.0,), "a positive number"),
-    (gains, "bandwidth", (NAN,), "a positive number"),
-    (gains, "lead_time", (INF,), "a positive number"),
-    (gains, "dead_zone", (-1e-6,), "zero or a positive number"),
-    (gains, "friction_fraction", (-0.1,), "zero or a positive number"),
     (gains, "yielding", (1.1,), "at most 1"),
     (partial(listed_option, "pid"), "gain", (3.0,), "for pid: bandwidth"),
     (partial(listed_option, "shut-valves"), "gain", (3.0,), "for shut-valves: no options"),
@@ -218,6 +203,7 @@ TABLE = [
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
     (partial(Renderer(RIG, 320, 240).show, None), "frames_per_second", (0.0, -1.0, NAN, INF), ""),
+    (partial(ptx.assemble, "code.ptx", "code.cubin"), "gpu", ("h100",), "sm_"),
     (symbolic_model, "algebra", ("maple",), "'sympy', 'casadi'"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),
 ]  # fmt: skip

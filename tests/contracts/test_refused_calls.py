@@ -284,8 +284,3 @@ def test_a_refused_call_says_what_is_wrong_and_what_is_allowed(call, named, allo
     assert named in before, caught.value
     assert allowed in after, caught.value
     assert "\n" not in before + after
-
-
-def test_gymnasium_refuses_a_negative_seed():
-    with pytest.raises(gymnasium.error.Error, match="greater or equal to zero"):
-        lanes(seed=-1)()

@@ -1,1 +1,0 @@
-"""Tests of the environments and their loop."""

@@ -14,7 +14,6 @@ NAN, INF = math.nan, math.inf
 
 
 def refused(*words):
-    """A refusal with these words, in any order."""
     return pytest.raises(ValueError, match="(?s)" + "".join(f"(?=.*{re.escape(word)})" for word in ("allowed", *words)))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from birthsim_env import ForceProfile, Hold, Parameters
+from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.control_model import active_flow
@@ -176,3 +177,21 @@ def test_frames_are_pictures_and_a_window_shows_nothing_else(monkeypatch):
     assert [(frame.shape, frame.dtype) for frame in lanes.render()] == [((300, 400, 3), np.uint8)] * 2
     lanes.close(), lanes.close()
     assert make().render() is gymnasium.make_vec(CIRCLE, num_envs=2).render() is None
+
+
+@pytest.mark.parametrize(("period", "rate"), [(0.001, 1000), (0.01, 100), (0.03, 33), (0.04, 25)])
+def test_a_recording_plays_in_real_time_at_a_whole_rate(period, rate):
+    for env in (make(policy_period=period), gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=period)):
+        assert env.metadata["render_fps"] == rate
+        assert isinstance(env.metadata["render_fps"], int)
+
+
+@pytest.mark.parametrize(("period", "frames", "rate"), [(0.001, 3, 50.0), (0.01, 3, 50.0), (0.04, 2, 25.0)])
+def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(period, frames, rate, monkeypatch):
+    shown = []
+    monkeypatch.setattr(Renderer, "show", lambda self, scene, rate: shown.append((scene.time, rate)))
+    env = make(policy_period=period, render_mode="human")
+    env.reset(seed=0)
+    for _ in range(round(0.04 / period)):
+        env.step(np.zeros(4))
+    assert shown == [pytest.approx((k / rate, rate)) for k in range(frames)]

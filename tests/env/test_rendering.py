@@ -17,7 +17,8 @@ from tests.oracles.linkage_by_points import pose_from_lengths
 
 RIG = Parameters()
 RENDERER = Renderer(RIG)
-NOWHERE = (math.nan, math.nan)
+NAN, INF = math.nan, math.inf
+NOWHERE = (NAN, NAN)
 # Targets are left out unless a test looks for them: they would lie over the end effector.
 SCENE = Scene(
     time=1.0,
@@ -194,40 +195,43 @@ def test_the_arrow_points_along_the_force_and_grows_with_it_up_to_a_limit():
             assert sign * (run.mean() - row) > 0, "a force across the cylinder is drawn as a pull"
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"piston": (math.nan, 0.0)},
-        {"piston": (0.0, math.nan)},
-        {"piston": (5.0, 0.0)},
-        {"piston": (0.0, 1e30)},
-        {"piston": (0.0, 0.9), "user_force": (30.0, 10.0)},
-        {"target": (math.inf, 0.0), "compliant_target": (1e300, -1e300)},
-        {"user_force": (math.nan, 1.0)},
-        {"user_force": (math.inf, -math.inf)},
-        {"user_force": (1e300, 1e300)},
-        {"pressures": (math.nan, -1e9, 1e12, math.inf)},
-        {"stiffness": (math.nan, math.inf), "time": math.nan},
-        {"path": np.array([[0.4, 0.0], [math.nan, 0.1], [0.5, 0.0], [0.6, 0.1], [1e300, 0.0]])},
-        {"title": "a\0b\nc " * 60},
-        {"title": ""},
-    ],
-)
-def test_nothing_strange_raises_or_is_drawn_far_outside(values, monkeypatch):
+STRANGE = {
+    "piston": [(NAN, 0.0), (0.0, NAN), (5.0, 0.0), (0.0, 1e30), (0.0, 0.9)],
+    "user_force": [(NAN, 1.0), (INF, -INF), (1e300, 1e300)], "target": [(INF, 0.0)], "compliant_target": [(1e300, -1e300)],
+    "pressures": [(NAN, -1e9, 1e12, INF)], "stiffness": [(NAN, INF)], "time": [NAN], "title": ["a\0b\nc " * 60, ""],
+    "path": [np.array([[0.4, 0.0], [NAN, 0.1], [0.5, 0.0], [0.6, 0.1], [1e300, 0.0]])],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in STRANGE.items() for value in values])
+def test_nothing_strange_raises_or_is_drawn_far_outside(name, value, monkeypatch):
     """SDL takes seconds over coordinates far outside."""
     places = []
 
     def noted(draw):
         return lambda surface, colour, *shape: (places.extend(map(np.ravel, shape)), draw(surface, colour, *shape))[1]
 
-    for name in ("polygon", "lines", "circle"):
-        monkeypatch.setattr(pygame.draw, name, noted(getattr(pygame.draw, name)))
-    assert Renderer(RIG, 320, 240).frame(changed(**values)).any()
+    for shape in ("polygon", "lines", "circle"):
+        monkeypatch.setattr(pygame.draw, shape, noted(getattr(pygame.draw, shape)))
+    assert Renderer(RIG, 320, 240).frame(changed(**{"user_force": (30.0, 10.0), name: value})).any()
     assert 100 < np.abs(np.concatenate(places)).max() <= 30_000
 
 
+@pytest.mark.parametrize("size", [(640, 480), (641, 487)])
+def test_a_frame_does_not_depend_on_those_before(size):
+    """Only what changes is drawn anew: nothing of it may stay behind or be missing."""
+    rng, renderer = np.random.default_rng(0), Renderer(RIG, *size)
+    for k in range(12):
+        target, path = rng.uniform((0.3, -0.2), (0.7, 0.2)), rng.uniform((0.2, -0.3), (0.9, 0.3), (k, 2))
+        piston = tuple(rng.uniform((-0.09, -0.18), (0.09, 0.18))) if k % 5 else (NAN, 0.0)
+        drawn = {"target": tuple(target), "compliant_target": tuple(target + rng.normal(0, 0.03, 2)), "path": path}
+        told = {"user_force": tuple(rng.normal(0, 60, 2)), "pressures": tuple(rng.uniform(1e5, 7e5, 4))}
+        scene = changed(time=0.1 * k, piston=piston, stiffness=(1e3 * k, 2e3), **drawn, **told)
+        np.testing.assert_array_equal(renderer.frame(scene), Renderer(RIG, *size).frame(scene))
+
+
 def test_a_path_is_broken_at_gaps_and_drawn_elsewhere():
-    path = np.array([[0.45, -0.1], [0.55, -0.1], [math.nan, 0.0], [0.45, -0.2], [0.55, -0.2]])
+    path = np.array([[0.45, -0.1], [0.55, -0.1], [NAN, 0.0], [0.45, -0.2], [0.55, -0.2]])
     picture = RENDERER.frame(changed(path=path))
 
     def darker(point):
@@ -243,8 +247,8 @@ SCRIPT = """
 import sys
 import numpy as np
 import birthsim_env.env, birthsim_env.vector_env
-from birthsim_env.physics.rig.parameters import Parameters
 assert "pygame" not in sys.modules, "importing must not load pygame"
+from birthsim_env import Parameters
 import birthsim_env.drawing.rendering as rendering
 scene = rendering.Scene(0.0, (0.0, 0.0), (0.5, 0.0), (0.5, 0.0), (0.0, 0.0), (2e5,) * 4, (1.0, 1.0), np.zeros((0, 2)))
 rendering.Renderer(Parameters()).frame(scene)

@@ -39,7 +39,6 @@ def several(*values):
 
 @pytest.fixture(scope="module")
 def ideal():
-    """A mass, spring and damper under 10 N along x and askew."""
     direction = np.array([[1.0, 0.6], [0.0, 0.8]])
     port = IdealPort(several(MASS, MASS), several(DAMPING, DAMPING), several(STIFFNESS, STIFFNESS), target=several(0.5, 0.0))
     return record(port, multisine_hand(direction, several(10.0, 10.0), 1), SECONDS), direction
@@ -47,7 +46,6 @@ def ideal():
 
 @pytest.fixture(scope="module")
 def late():
-    """A spring that answers 50 ms late."""
     direction = np.array([[1.0], [0.0]])
     port = IdealPort(several(LIGHT), several(DRAG), several(STIFFNESS), LATE)
     return record(port, multisine_hand(direction, several(10.0), 1), SECONDS), direction
@@ -96,7 +94,6 @@ def test_where_an_impedance_would_be_agrees_with_its_matrix_exponential():
 
 @pytest.mark.slow
 def test_a_late_spring_is_felt_late(late):
-    """Magnitude and phase as K exp(-sT), and the bandwidth that follows from them."""
     felt, truth = impedance_felt(*late)[:, 0], impedance(FREQUENCIES, LIGHT, DRAG, STIFFNESS, LATE)
     assert np.abs(felt / truth - 1).max() < 3e-3
     declared = impedance(FREQUENCIES, LIGHT, DRAG, STIFFNESS)

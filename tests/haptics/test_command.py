@@ -86,7 +86,6 @@ def test_tables_say_lost_and_refused():
 
 
 def test_the_phase_is_shown_near_the_declared_one():
-    """190 degrees beside 170, not -170."""
     felt, declared = np.exp(1j * np.radians([[190.0]])), np.exp(1j * np.radians([[174.0]]))
     np.testing.assert_allclose(phase(felt, declared), 190.0)
 
@@ -122,7 +121,6 @@ def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost():
 
 @pytest.mark.slow
 def test_the_command(tmp_path, monkeypatch, capsys):
-    """Every subject on the nominal rig: strict JSON, tables, pictures; a controller that declares nothing has its errors."""
     monkeypatch.setattr(rendering, "STIFFNESSES", (2000.0,))
     monkeypatch.setattr(backdriving, "STIFFNESSES", (500.0, 0.0))
     own = tmp_path / "own.py"

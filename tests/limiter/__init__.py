@@ -1,1 +1,0 @@
-"""Tests of the limits at the port."""

@@ -37,7 +37,6 @@ def counted(phase, size=SIZE):
 
 
 def late(lag):
-    """Gain and delay of a low-pass at W."""
     return 1 / math.hypot(1, W * lag), math.atan(W * lag)
 
 

@@ -111,7 +111,6 @@ def served(folder):
 
 
 def launch(playwright):
-    """A headless browser with a profile of its own."""
     return playwright.chromium.launch(executable_path=find_chromium(), headless=True, args=ARGUMENTS)
 
 
@@ -162,7 +161,6 @@ class Window:
         return found
 
     def _value_by_now(self, expression):
-        """Of an expression that may ask for what is not there yet: between two rigs there is no frame."""
         from playwright.sync_api import Error
 
         try:
@@ -190,7 +188,6 @@ class Window:
         self.wait("birthsim.hello.mode === 'replay'")
 
     def back(self):
-        """From a recording to the rig."""
         self.page.locator("#back").click()
         self.wait("birthsim.hello.mode === 'live'")
 

@@ -9,7 +9,6 @@ from tests.live.browser import CALM, Server, Window
 
 @pytest.fixture(scope="session")
 def page(tmp_path_factory):
-    """A folder with the page."""
     folder = tmp_path_factory.mktemp("worker") / "page"
     write_page(folder, packed_page(Parameters()))
     return folder
@@ -23,7 +22,6 @@ def server():
 
 @pytest.fixture
 def window(chromium, server):
-    """A window with a rig of its own."""
     with Window(chromium, server.url + CALM) as opened:
         opened.wait(f"birthsim.settings.controller === '{CALM.partition('=')[2]}'")
         yield opened

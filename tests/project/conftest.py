@@ -7,8 +7,6 @@ from tests.console import ROOT
 
 @pytest.fixture(scope="session")
 def generated():
-    """Imports a module of what generates parts of the site, by its name there."""
-
     def module(name):
         with pytest.MonkeyPatch.context() as patch:
             patch.syspath_prepend(ROOT / "docs")

@@ -25,7 +25,6 @@ TABLES = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data"
 
 
 def with_tables(page):
-    """The text of a page, and that of the tables that it includes."""
     text = page.read_text(encoding="utf-8")
     return re.sub(r"^```\{include\} data/(.*)\n```$", lambda block: TABLES[block[1]], text, flags=re.MULTILINE)
 
@@ -42,7 +41,6 @@ TABLE = """<!doctype html><article><table class="docutils"><thead><tr><th>law</t
 
 
 def listed(page):
-    """The pages that the toctrees of a page name."""
     folder = (DOCS / page).parent
     for block in re.findall(r"^```\{toctree\}\n(.*?)^```", PAGES[page], re.MULTILINE | re.DOTALL):
         for line in filter(None, block.splitlines()):
@@ -74,7 +72,6 @@ def test_every_figure_of_an_explanation_stands_in_a_page_that_it_links(page):
 
 @pytest.fixture(scope="module")
 def parts(generated):
-    """The generated parts of the site."""
     return {name: part() for name, part in generated("").PARTS.items()}
 
 
@@ -155,7 +152,6 @@ def test_the_first_word_of_the_glossary_in_a_page_explains_itself(page_of, gener
 
 @pytest.fixture
 def page_of(chromium):
-    """A function that shows HTML in a browser."""
     with chromium.new_context() as context:
 
         def shown(content):

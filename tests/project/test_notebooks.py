@@ -24,7 +24,6 @@ def notebooks(generated):
 
 
 def read(notebooks, name):
-    """Sources of a notebook's code cells, and all its words."""
     notebook = nbformat.reads(notebooks.notebook(name), 4)
     nbformat.validate(notebook)
     code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]

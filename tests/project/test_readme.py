@@ -11,7 +11,6 @@ PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def reader(page):
-    """The folder from which the links of a page lead on: a table's are those of the pages that include it."""
     return page.parents[page.parent.name == "data"]
 
 

@@ -24,7 +24,6 @@ UPLOT = {
 
 
 def plain(name):
-    """A project's name as indexes compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 

@@ -52,6 +52,7 @@ def test_every_combination_of_the_grid_meets_every_draw(sweep):
     assert all(0.001 <= lag <= 0.01 and sensors in ("ideal", "lab") for lag, sensors in draws)
     assert found.maps == [HeatMap("rig.valves.time_constant", "rig.mechanics.mass", per="controller")]
     assert found.search is None
+    assert sweep("").points == [{}]
 
 
 def test_a_draw_does_not_depend_on_how_many_there_are(sweep):
@@ -69,10 +70,6 @@ def test_ranges_are_even_or_by_equal_factors():
     # Uniform in the logarithm: as many draws below the geometric mean as above it.
     places = [math.log(Range(1.0, 100.0, log=True).at(k / 1000)) for k in range(1000)]
     assert sum(place < math.log(10.0) for place in places) == 500
-
-
-def test_a_file_without_tables_is_one_point(sweep):
-    assert sweep("").points == [{}]
 
 
 def test_layers_of_a_trained_network_may_be_set(sweep):

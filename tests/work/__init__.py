@@ -1,1 +1,0 @@
-"""How work is shared out, stored and continued."""

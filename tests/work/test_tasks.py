@@ -13,7 +13,6 @@ from birthsim_env.physics.compiled.sources import hashes
 
 
 def square(log, number):
-    """Writes down that it ran, and squares."""
     with open(log, "a", encoding="utf-8") as file:
         file.write(f"{number}\n")
     return {"square": number**2, "nothing": math.nan}

@@ -1,1 +1,0 @@
-"""The live page in headless Chromium, against a real server."""

@@ -34,7 +34,6 @@ DIGITS = "[...document.querySelectorAll('#physics dd span')].map((e) => Number(e
 
 @pytest.fixture
 def pair(chromium, server):
-    """A window whose address asks for a second rig."""
     with Window(chromium, f"{server.url}?controller={FIRST}&compare={SECOND}") as opened:
         opened.wait(f"birthsim.settings.controller === '{FIRST}' && {BESIDE}")
         yield opened

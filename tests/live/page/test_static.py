@@ -17,7 +17,6 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """A folder, made by the command, with a policy of one's own."""
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
     own = shutil.copytree(seeds.SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
     done = command("live", "--static", folder, "--policy", own)
@@ -27,7 +26,6 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def server(built):
-    """Of files, which has the page below another folder."""
     with served(built.parent) as url:
         yield SimpleNamespace(url=f"{url}{built.name}/")
 

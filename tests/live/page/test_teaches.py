@@ -130,7 +130,6 @@ def test_about_names_paper_licence_and_version(window):
 
 
 def saved(window, button):
-    """What a button of the menu saves, as bytes."""
     window.page.locator("[popovertarget=files]").click()
     with window.page.expect_download() as download:
         window.page.locator(button).click()

@@ -1,1 +1,0 @@
-"""Recordings and the logs that are written from them."""

@@ -45,7 +45,6 @@ def test_a_file_that_ends_early_is_read_as_far_as_it_goes(file, tmp_path):
 
 
 def rewritten(path, folder, change):
-    """A copy of a recording, of two chunks, whose header, events and rows ``change`` has seen."""
     whole = load_recording(path)
     parts = {"header": header_of(whole.rig), "events": whole.events, "rows": np.hstack([whole.rows, whole.second])}
     change(parts)

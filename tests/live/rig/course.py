@@ -24,7 +24,6 @@ class Course:
         return self.seen.reference.rows[:8, 0].copy()
 
     def follow(self, trajectory, now):
-        """From ``now``, s, on another trajectory."""
         self.sample(now)
         self._put(trajectory)
         self.inputs.begins[:], self.inputs.passes[0] = now, 1.0

@@ -61,7 +61,6 @@ class Hand(UserForce):
 
 
 def expected(controller, settings, hold, rig):
-    """What Gymnasium's environment does under such settings and such a hand."""
     scenario, friction = settings.get("scenario", "probe"), settings.get("friction", 1.0)
     changes = {"mechanics.mass": settings.get("mass", rig.mechanics.mass)}
     for name, cylinder in (("cylinder1", rig.cylinder1), ("cylinder2", rig.cylinder2)):
@@ -81,7 +80,6 @@ def expected(controller, settings, hold, rig):
 
 
 def check(page, *cases, rig=DEFAULT):
-    """Cases of settings and a hand."""
     cases = [({"controller": "admittance-backstepping", **settings}, hold) for settings, hold in cases]
     steps = [[("set", settings), ("reset", None), ("hold", hold), ("advance", PERIODS)] for settings, hold in cases]
     for (settings, hold), told in zip(cases, run(page, *steps), strict=True):

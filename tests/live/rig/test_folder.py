@@ -17,7 +17,6 @@ RIG = Parameters()
 
 @pytest.fixture
 def mine(tmp_path):
-    """A folder as birthsim train leaves it."""
     return str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
 
 

@@ -13,7 +13,6 @@ TEMPERATURES = [lanes.TP1, lanes.TN1, lanes.TP2, lanes.TN2]
 
 
 def moving_plant(law):
-    """A rig whose pistons slide, its bristles bent."""
     plant = Plant(Parameters().replace({"friction.law": law}))
     plant.advance(np.array([[0.6], [-0.6], [-0.4], [0.4]]), np.array([[20.0], [-10.0]]), 0.2)
     assert (np.abs(plant.piston_speed) > 0.01).all()

@@ -17,16 +17,13 @@ from tests.live.rig.worker import node, run
 
 COUNT = 8
 BEGUN = """
-import { readFileSync } from "node:fs";
 import { Learner } from "./learning/learner.js";
 import { Adam, Network } from "./learning/network.js";
 
-const given = JSON.parse(readFileSync(0));
 const about = { ...JSON.parse(readFileSync("rig/learn.json")), ...given.about };
 const bytes = readFileSync("rig/learn.bin");
 const data = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
 const learner = new Learner(new WebAssembly.Module(readFileSync("rig/learn.wasm")), about, data);
-const text = (numbers) => Buffer.from(Float64Array.from(numbers).buffer).toString("base64");
 """
 GRADIENT = """
 learner.left.forEach((_, lane) => learner.lanes.begin(lane, lane));
@@ -35,12 +32,8 @@ learner.back(learner.forward());
 console.log(JSON.stringify([text(learner.network.gradient), text(learner.lanes.seen), learner.left]));
 """
 LOST = """
-import { readFileSync } from "node:fs";
-import { load } from "./rig/birthsim.js";
 import { Hub } from "./worker/hub.js";
 
-const pack = JSON.parse(readFileSync("rig/pack.json"));
-const bundle = await load({ code: readFileSync("rig/loop.wasm"), data: readFileSync("rig/loop.bin") });
 const found = ["learning", "pid"].map((controller) => {
   const hub = new Hub(pack, bundle, () => {});
   hub.session.change({ controller });

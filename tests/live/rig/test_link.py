@@ -5,11 +5,10 @@ import pytest
 from tests.live.rig.worker import node
 
 SCRIPT = """
-import { readFileSync } from "node:fs";
 import { settingsIn } from "./link.js";
 import { checked } from "./worker/settings.js";
 
-const { hello } = JSON.parse(readFileSync("rig/pack.json"));
+const { hello } = pack;
 const outcome = (search) => {
   const read = settingsIn(search, hello.defaults);
   try {
@@ -18,7 +17,7 @@ const outcome = (search) => {
     return [read, error.message];
   }
 };
-console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(outcome)));
+console.log(JSON.stringify(given.map(outcome)));
 """
 CASES = {
     "": {},

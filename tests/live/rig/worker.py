@@ -11,17 +11,22 @@ from birthsim_build.layout import ROWS
 from birthsim_live.logs.recording import COLUMNS, SLICES
 from tests.build.targets import need_program
 
-SCRIPT = """
+HEAD = """
 import { readFileSync } from "node:fs";
 import { load } from "./rig/birthsim.js";
+const given = JSON.parse(readFileSync(0));
+const pack = JSON.parse(readFileSync("rig/pack.json"));
+const bundle = await load({ code: readFileSync("rig/loop.wasm"), data: readFileSync("rig/loop.bin") });
+const text = (numbers) => Buffer.from(Float64Array.from(numbers).buffer).toString("base64");
+"""
+"""What every script has: its input, and the rig of the page."""
+SCRIPT = """
 import { frameOf, rowOf } from "./worker/frames.js";
 import { Session } from "./worker/session.js";
 
-const pack = JSON.parse(readFileSync("rig/pack.json"));
-const bundle = await load({ code: readFileSync("rig/loop.wasm"), data: readFileSync("rig/loop.bin") });
-const text = (rows) => Buffer.from(Float64Array.from(rows.flatMap((row) => [...row])).buffer).toString("base64");
 const said = [];
-for (const steps of JSON.parse(readFileSync(0))) {
+const flat = (rows) => text(rows.flatMap((row) => [...row]));
+for (const steps of given) {
   const session = new Session(pack, bundle);
   const told = [];
   for (const [kind, value] of steps) {
@@ -43,7 +48,7 @@ for (const steps of JSON.parse(readFileSync(0))) {
       }
     } else note();
     const { lost, halted } = session;
-    told.push({ rows: rows.map(text), done, frame: frameOf(session), lost, halted, settings: session.shownSettings() });
+    told.push({ rows: rows.map(flat), done, frame: frameOf(session), lost, halted, settings: session.shownSettings() });
   }
   said.push(told);
 }
@@ -66,7 +71,6 @@ class Told(NamedTuple):
     settings: dict[str, Any]
 
     def of(self, name):
-        """A field of the last row."""
         return self.row[-1, SLICES[name]]
 
 
@@ -74,7 +78,7 @@ def node(folder, script, given=None):
     """What a script beside the page in ``folder`` prints as JSON; it reads what is ``given`` from its input."""
     need_program("node", "nodejs")
     (folder / "package.json").write_text('{"type": "module"}')
-    (folder / "try.js").write_text(script)
+    (folder / "try.js").write_text(HEAD + script)
     done = subprocess.run(["node", "try.js"], cwd=folder, input=json.dumps(given), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

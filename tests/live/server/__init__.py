@@ -1,1 +1,0 @@
-"""The server as browsers and strangers meet it."""

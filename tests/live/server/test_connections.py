@@ -21,7 +21,6 @@ SHORT = 0.3  # s for a request
 
 @pytest.fixture(scope="module")
 def port(app):
-    """A server as the command makes it, in a thread."""
     with listen("127.0.0.1", 0) as listening:
         server = uvicorn.Server(configured(app("shut-valves"), SHORT))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})

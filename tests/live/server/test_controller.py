@@ -62,7 +62,6 @@ GOES_ON = []
 
 
 def numbers(rows=None, sampled=False):
-    """What the page sends."""
     return np.concatenate([[float(sampled)], np.zeros(ASKED) if rows is None else rows]).tobytes()
 
 
