@@ -7,7 +7,7 @@ import pytest
 from agents.residual import authority
 from agents.residual.env import ResidualEnv, ResidualVectorEnv
 from agents.residual.law import ResidualActuation, ResidualLaw
-from agents.residual.settings import IMPEDANCES, LAWS
+from agents.residual.settings import FORCE_LAWS, IMPEDANCES, LAWS
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
@@ -70,8 +70,10 @@ def assert_follows(env, actions, rows, seed):
 def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
-    for impedance, size in IMPEDANCES.items() if law.startswith("backstepping") else [("fixed", 2)]:
-        env = single(law=law, impedance=impedance, **arguments)
+    settings = [(size, {"impedance": name}) for name, size in IMPEDANCES.items() if size == 2 or law.startswith("backstepping")]
+    settings += [(2, {"informed": True}), *([] if law in FORCE_LAWS else [(2, {"force_sensor": False})])]
+    for size, more in settings:
+        env = single(law=law, **more, **arguments)
         assert_follows(env, np.zeros((140, size), np.float32), rows, seed=3)
     # It was no standstill: the first push has come.
     assert np.abs(rows[-1][1]["user_force"]).max() > 5
