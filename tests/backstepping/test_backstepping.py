@@ -37,11 +37,7 @@ def random_situations(
     without_air = [*s["piston"], *s["speed"], 0.0, 0.0, *s["wanted"], *s["gains"], *s["believed"], *values]
     star = -np.array([errors(*without_air)[i][2] for i in (0, 1)])
     s["force"] = star + rng.normal(0, 3, (2, lanes))
-    pressures = [
-        derived.pressures_for(s["force"][i], s["pneumatic"][i], s["piston"][i], cylinder, rig)
-        for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2))
-    ]
-    s["pressures"] = np.concatenate(pressures)
+    s["pressures"] = derived.air_for(s["force"], s["pneumatic"], s["piston"], rig)
     s["feedforward_rate"] = rng.normal(0, 100, (2, lanes))
     possible = np.all((s["pressures"] > 1.1e5) & (s["pressures"] < 6.9e5), axis=0)
     return {name: value[:, possible] for name, value in s.items()}

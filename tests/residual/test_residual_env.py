@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from agents.residual import authority
-from agents.residual.env import ResidualEnv, ResidualVectorEnv
 from agents.residual.law import ResidualActuation, ResidualLaw
 from agents.residual.settings import FORCE_LAWS, IMPEDANCES, LAWS
 from baselines.registry import make_controller
@@ -21,16 +20,12 @@ CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 RIG = Parameters()
 
 
-def single(name=CIRCLE, **arguments) -> ResidualEnv:
-    env = gymnasium.make(name, **arguments).unwrapped
-    assert type(env) is ResidualEnv
-    return env
+def single(name=CIRCLE, **arguments):
+    return gymnasium.make(name, **arguments).unwrapped
 
 
-def lanes(count=3, name=CIRCLE, **arguments) -> ResidualVectorEnv:
-    env = gymnasium.make_vec(name, num_envs=count, **{"autoreset_mode": "SameStep", **arguments})
-    assert type(env) is ResidualVectorEnv
-    return env
+def lanes(count, name=CIRCLE, **arguments):
+    return gymnasium.make_vec(name, num_envs=count, autoreset_mode="SameStep", **arguments)
 
 
 def random_actions(steps, count, size=2, seed=0):
