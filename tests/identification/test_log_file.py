@@ -15,7 +15,6 @@ from baselines.logs.log import Column, Log, Series
 from baselines.logs.table import read_table
 from baselines.logs.writing import write_log
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
 from tests.identification.trials import OWNER, part, trial
 
 SHORT = part(trial(), 0, 2100)
@@ -166,9 +165,3 @@ def test_what_is_no_number_in_a_message_is_named_by_its_row(value: object, tmp_p
         log.finish()
     with pytest.raises(ValueError, match="row 9: position_x = nan; allowed: finite numbers in every row"):
         read_trial(tmp_path / "log.mcap", OWNER)
-
-
-def test_a_file_of_another_kind_is_not_written(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=re.escape("allowed: a file that ends in .csv, .parquet, .mcap")):
-        write_trial(SHORT, tmp_path / "log.xlsx", Parameters())
-    assert list(tmp_path.iterdir()) == []
