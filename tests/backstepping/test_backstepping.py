@@ -11,7 +11,7 @@ from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law as derived
-from tests.oracles import linkage_by_points as by_points
+from tests.oracles import rigid_body
 from tests.oracles.gain_range import closed_loop_damping
 from tests.physics.rigs import TILTED
 
@@ -37,11 +37,7 @@ def random_situations(
     without_air = [*s["piston"], *s["speed"], 0.0, 0.0, *s["wanted"], *s["gains"], *s["believed"], *values]
     star = -np.array([errors(*without_air)[i][2] for i in (0, 1)])
     s["force"] = star + rng.normal(0, 3, (2, lanes))
-    pressures = [
-        derived.pressures_for(s["force"][i], s["pneumatic"][i], s["piston"][i], cylinder, rig)
-        for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2))
-    ]
-    s["pressures"] = np.concatenate(pressures)
+    s["pressures"] = derived.air_for(s["force"], s["pneumatic"], s["piston"], rig)
     s["feedforward_rate"] = rng.normal(0, 100, (2, lanes))
     possible = np.all((s["pressures"] > 1.1e5) & (s["pressures"] < 6.9e5), axis=0)
     return {name: value[:, possible] for name, value in s.items()}
@@ -117,15 +113,13 @@ def test_a_damping_factor_multiplies_the_damping_of_equal_gains_and_leaves_the_s
     s["stiffness"] = rng.uniform(500, 6000, s["stiffness"].shape)
     law, signals = BacksteppingController(rig), as_signals(s, rig)
     equal, damped = law.inspect(*signals).gains, law.inspect(*signals, None, None, np.full(s["piston"].shape[1], factor)).gains
-    r4, r2 = s["piston"][0] + rig.geometry.k1, s["piston"][1] + rig.geometry.k2
-    pose = by_points.pose_from_lengths(r4, r2, rig.geometry)
+    squares = rigid_body.jacobians(s["piston"], rig) ** 2
+    masses, asked = rig.mechanics.mass * squares.sum(axis=1), np.einsum("an,nai->ni", s["stiffness"], squares)
     assert damped.min() > 0
     for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
-        column, _ = by_points.cartesian_velocity(pose, r2, 1.0 - i, float(i))
-        masses, asked = rig.mechanics.mass * (column**2).sum(axis=0), (s["stiffness"] * column**2).sum(axis=0)
-        for lane, mass in enumerate(masses):
+        for lane, (mass, stiffness) in enumerate(zip(masses[:, i], asked[:, i], strict=True)):
             damping = factor * closed_loop_damping(*equal[:, i, lane], mass, cylinder.viscous_friction)
-            expected = derived.damped_gains(asked[lane], damping, mass, cylinder.viscous_friction)
+            expected = derived.damped_gains(stiffness, damping, mass, cylinder.viscous_friction)
             np.testing.assert_allclose(damped[:, i, lane], expected, rtol=1e-6)
 
 

@@ -1,7 +1,6 @@
 """Openings that put the force before the pneumatic stiffness, against the valves' characteristic and linear programmes."""
 
 import gymnasium
-import numba
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -16,22 +15,14 @@ RIG = Parameters()
 LENGTH = RIG.cylinder2.stroke
 
 
-@numba.njit
-def openings_of_both(cases: Array, ap: float, an: float, stroke: float, p: Array, u: Array) -> None:
-    """``u`` (4, N): force first, then neither first; ``cases`` (6, N): dF/dt, dK/dt, Pp, Pn, y, v."""
-    for i in range(cases.shape[1]):
-        rate, stiffness_rate, pp, pn, y, v = cases[0, i], cases[1, i], cases[2, i], cases[3, i], cases[4, i], cases[5, i]
-        air = CylinderAir(pp, pn, ap, an, stroke / 2 + y, stroke / 2 - y, v)
-        u[0, i], u[1, i] = force_first_openings(rate, stiffness_rate, air, p)
-        u[2, i], u[3, i] = two_valve_openings(rate, stiffness_rate, air, p)
-
-
 def openings(cases: Array, rig: Parameters = RIG) -> tuple[Array, Array]:
-    """Force first and neither first, (2, N) each, of cylinder 2."""
-    u = np.empty((4, cases.shape[1]))
-    openings_of_both(cases, *derived_law.areas(rig.cylinder2), LENGTH, Rig(parameter_column(rig)), u)
-    assert np.abs(u).max() <= 1
-    return u[:2], u[2:]
+    """Force first and neither first, (2, N) each, of cylinder 2; ``cases`` (6, N): dF/dt, dK/dt, Pp, Pn, y, v."""
+    areas, p, found = derived_law.areas(rig.cylinder2), Rig(parameter_column(rig)), []
+    for rate, stiffness_rate, pp, pn, y, v in cases.T:
+        air = CylinderAir(pp, pn, *areas, LENGTH / 2 + y, LENGTH / 2 - y, v)
+        found.append([way(rate, stiffness_rate, air, p) for way in (force_first_openings, two_valve_openings)])
+    assert np.abs(found).max() <= 1
+    return tuple(np.transpose(found, (1, 2, 0)))
 
 
 def drawn(count: int, rates: float, seed: int, pressures: tuple[float, float] = (1.02e5, 6.98e5)) -> Array:
@@ -49,26 +40,16 @@ def got(case: Array, opening: Array, rig: Parameters = RIG) -> Array:
     return derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, rig.cylinder2, rig)
 
 
-def unit_rates(y: float, pp: float, pn: float, v: float) -> tuple[Array, Array]:
-    """dF/dt and dK/dt without flow, and per flow of each chamber as the columns of a matrix."""
-
-    def rates(*flows: float) -> Array:
-        return derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, RIG.cylinder2, RIG)
-
-    still = rates(0.0, 0.0)
-    return still, np.transpose([rates(1.0, 0.0) - still, rates(0.0, 1.0) - still])
-
-
 def best(case: Array) -> tuple[float, float]:
     """The dF/dt nearest to the wanted one, and with it the pressurisation flow nearest to the one that dK/dt asks for.
 
     Two linear programmes over the flows that the valves can carry: min |dF/dt - wanted|, then min |qT - wanted|.
     """
     rate, stiffness_rate, pp, pn, y, v = case
-    still, gain = unit_rates(y, pp, pn, v)
-    lp, ln = LENGTH / 2 + y, LENGTH / 2 - y
-    to_qt = 0.5 * LENGTH * np.array([1 / lp, 1 / ln])
-    wanted_qt = to_qt @ np.linalg.solve(gain, np.array([rate, stiffness_rate]) - still)
+    at = y, v, RIG.cylinder2, RIG
+    still, of_p, of_n = (derived_law.force_and_stiffness_rates((pp, pn), q, *at)[0] for q in ((0, 0), (1, 0), (0, 1)))
+    to_qt = 0.5 * LENGTH / np.array([LENGTH / 2 + y, LENGTH / 2 - y])
+    wanted_qt = to_qt @ derived_law.flows_for(np.array([rate, stiffness_rate]), (pp, pn), *at)
     limits = [sorted(derived_law.net_flow(s, pressure, RIG) for s in (-1.0, 0.0, 1.0)) for pressure in (pp, pn)]
     bounds = [(1e4 * low, 1e4 * high) for low, _, high in limits]
 
@@ -80,10 +61,10 @@ def best(case: Array) -> tuple[float, float]:
         assert found.status == 0, found.message
         return np.asarray(found.x[:2])
 
-    force_row = 1e-4 * gain[0] / 1e3
-    first = nearest(force_row, (rate - still[0]) / 1e3)
+    force_row = 1e-4 * np.array([of_p - still, of_n - still]) / 1e3
+    first = nearest(force_row, (rate - still) / 1e3)
     second = nearest(to_qt, 1e4 * wanted_qt, force_row, float(force_row @ first))
-    return still[0] + 1e3 * float(force_row @ first), 1e-4 * float(to_qt @ second)
+    return still + 1e3 * float(force_row @ first), 1e-4 * float(to_qt @ second)
 
 
 def assert_nearest(case: Array, opening: Array) -> None:

@@ -36,12 +36,8 @@ def measured(x: Array, rig: Parameters) -> Measurement:
     """Exact sensors on a state of the model, rows y2 v2 F2 K2 y1 v1 F1 K1 (12)."""
     piston, speed, clock = x[[4, 0]], x[[5, 1]], np.zeros(x.shape[1])
     velocity = np.einsum("ijn,jn->in", geometry.jacobian(piston, rig), speed)
-    air = [
-        derived.pressures_for(x[row + 2], x[row + 3], x[row], cylinder, rig)
-        for row, cylinder in ((4, rig.cylinder1), (0, rig.cylinder2))
-    ]
-    position = geometry.end_effector(piston, rig)
-    return Measurement(clock, position, clock, velocity, np.concatenate(air), np.zeros((2, x.shape[1])), sampled=False)
+    air, position = derived.air_for(x[[6, 2]], x[[7, 3]], piston, rig), geometry.end_effector(piston, rig)
+    return Measurement(clock, position, clock, velocity, air, np.zeros((2, x.shape[1])), sampled=False)
 
 
 def virtual_flows(law: BacksteppingController, x: Array, reference: Reference) -> Array:

@@ -1,1 +1,0 @@
-"""Tests of laws and what they work out."""

@@ -184,12 +184,10 @@ TIMES = PERIOD * np.arange(2000)
 def test_sustained_oscillation_lowers_the_gain_down_to_the_least(frequency: float) -> None:
     """By 0.9 at each half wave after the second one, never below 0.35."""
     fraction = watched(0.1 * np.sin(2 * np.pi * frequency * TIMES))
-    falls = np.round(np.log(fraction) / np.log(0.9), 9)
     half_waves = np.floor(2 * frequency * TIMES - 1e-9)
     expected = np.maximum(0.9 ** np.maximum(half_waves - 1, 0), 0.35)
     assert np.mean(np.abs(fraction - expected) < 1e-12) > 0.97, "but for the instants of the sign's change"
     assert fraction.min() == pytest.approx(max(0.35, 0.9 ** np.floor(2 * frequency * 2 - 2)), rel=0.11)
-    assert falls.min() == 0
 
 
 @pytest.mark.parametrize(("most", "falls"), [(1.0, 1), (2.0, 2), (3.0, 3), (9.0, 3)])

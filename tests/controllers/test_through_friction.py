@@ -5,7 +5,6 @@ import pytest
 
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
-from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
@@ -54,17 +53,10 @@ def test_it_comes_back_calmly_from_a_load_beyond_its_strength(sensors: str) -> N
     rig = BELIEVED.replace({"mechanics.mass": 5.0, "valves.time_constant": 0.007})
     wanted = closed_loop.holding(np.array([[0.55], [0.0]]), 2000.0)
     plant, law = closed_loop.resting_at(wanted, rig), AdmittanceController(BELIEVED, learn=False)
-    tracker = LabSensors(rig.electronics, 1)
-    tracker.begin(0, np.random.default_rng(0))
-    off = []
-    for tick in range(2800):
-        force = np.array([[0.0], [-45.0 if 500 <= tick < 1300 else 0.0]])
-        clock = np.array([1e-3 * tick])
-        if sensors == "lab":
-            seen = tracker.measure(np.array([tick]), clock, plant.end_effector(), plant.pressures, force)
-        else:
-            seen = closed_loop.ideal(plant, clock[0], force)
-        plant.advance_unchecked(law.command(seen, wanted), force[None], 1e-3)
+    sense, off = closed_loop.ideal if sensors == "ideal" else closed_loop.tracker(rig, 1), []
+    for _ in closed_loop.run(
+        plant, law.command, lambda t: wanted, lambda t: np.array([[0.0], [-45.0 * (0.5 <= t < 1.3)]]), 2.8, sense
+    ):
         off.append(np.hypot(*(plant.end_effector()[:2, 0] - wanted.position[:, 0])))
     assert max(off) > 0.04
     assert max(off[1800:]) < 3e-3

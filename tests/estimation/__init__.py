@@ -1,1 +1,0 @@
-"""Tests of what laws work out from sensors."""

@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 from tests.oracles.observed import Measured
 
@@ -78,8 +77,6 @@ def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
         joints = estimator.update(seen, user[:, None], known(tick * PERIOD)[:, None])
         np.testing.assert_allclose(joints[:, 0], [*y, *v], rtol=0, atol=1e-12)
         if tick > 150:
-            r2 = y[1] + RIG.geometry.k2
-            pose = by_points.pose_from_lengths(y[0] + RIG.geometry.k1, r2, RIG.geometry)
-            kappa = np.hypot(*by_points.cartesian_velocity(pose, r2, 1.0, 0.0)[0])
+            kappa = np.hypot(*rigid_body.jacobians(y[:, None], RIG)[0, :, 0])
             expected = unknown / (RIG.mechanics.mass * np.array([kappa**2, 1.0]))
             np.testing.assert_allclose(estimator.pistons.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2

@@ -14,22 +14,14 @@ LATE_ENOUGH = 20.0
 
 
 def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1, begin=0.0, wrong=(0.0, 0.0, 0.0), old=0.0):
-    """Truth and estimate (ticks, 4, lanes), and the errors of position when samples were taken (samples, lanes).
+    """Truth and estimate (ticks, 4, lanes), where the observer started ``old`` s before ``begin``, s.
 
     ``motion(t)`` -> (x, v) on both axes; ``acceleration(t, k)`` -> (2, lanes) is felt; ``wrong``: x, v and bias are put off.
-
-    The observer started ``old`` s before ``begin``, s.
     """
     stage, rng = inertial.law_stage(Parameters()), np.random.default_rng(7)
     memory, gains = inertial.Memory(np.repeat(stage.fresh[:, None], lanes, axis=1)), inertial.Gains(stage.constants)
-    point, signals, found, errors = (
-        inertial.Moving(np.empty((inertial.Moving.size, lanes))),
-        Signals(np.zeros((Signals.size, lanes))),
-        [],
-        [],
-    )
-    taken = [(begin, *(np.full((2, lanes), one) for one in motion(begin)))]
-    truth = []
+    point, signals = inertial.Moving(np.empty((inertial.Moving.size, lanes))), Signals(np.zeros((Signals.size, lanes)))
+    taken, truth, found = [(begin, *(np.full((2, lanes), one) for one in motion(begin)))], [], []
     for k in range(ticks):
         time = begin + k * PERIOD
         x, v = motion(time)
@@ -45,14 +37,13 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
                 own[:] += off
         truth.append(np.array([[x], [x], [v], [v]]) + np.zeros((4, lanes)))
         found.append(point.rows[:4].copy())
-        errors.append(point.position - x)
-    return np.array(truth), np.array(found), np.array(errors)[::EVERY]
+    return np.array(truth), np.array(found)
 
 
 @pytest.mark.parametrize("wrong", [(1e-3, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.3)])
 def test_an_error_dies_away_by_a_triple_pole(wrong):
-    _, _, errors = run(600, lambda t: (0.0, 0.0), lambda t, n: np.zeros((2, n)), latency=0.0, old=LATE_ENOUGH, wrong=wrong)
-    pole, e = np.exp(-inertial.BANDWIDTH * EVERY * PERIOD), errors[2:, 0, 0]
+    _, found = run(600, lambda t: (0.0, 0.0), lambda t, n: np.zeros((2, n)), latency=0.0, old=LATE_ENOUGH, wrong=wrong)
+    pole, e = np.exp(-inertial.BANDWIDTH * EVERY * PERIOD), found[2 * EVERY :: EVERY, 0, 0]
     left = e[3:] - 3 * pole * e[2:-1] + 3 * pole**2 * e[1:-2] - pole**3 * e[:-3]
     assert np.abs(e).max() > 1e-5
     assert np.abs(left).max() < 1e-12 * max(1.0, 1 / np.abs(e).max())
@@ -61,7 +52,7 @@ def test_an_error_dies_away_by_a_triple_pole(wrong):
 @pytest.mark.parametrize("latency", [0.0, 0.004, 0.0073])
 def test_late_rare_and_lost_samples_leave_no_error(latency):
     bias, jerk = 0.15, 0.8
-    truth, found, _ = run(
+    truth, found = run(
         2500, lambda t: (0.1 * t + jerk * t**3 / 6, 0.1 + jerk * t**2 / 2),
         lambda t, n: np.full((2, n), jerk * (t - PERIOD / 2) + bias), latency=latency, lost=0.2,
     )  # fmt: skip
@@ -83,7 +74,7 @@ def test_it_starts_as_fast_at_any_time():
 def test_the_speed_is_nearly_as_good_as_a_kalman_filter_of_samples_without_delay():
     spread, noise, lanes = 0.02, 1e-4, 40
     rng = np.random.default_rng(3)
-    truth, found, _ = run(
+    truth, found = run(
         5000, lambda t: (0.0, 0.0), lambda t, n: spread * rng.standard_normal((2, n)), noise=noise, lanes=lanes, old=LATE_ENOUGH
     )
     q, r = spread**2 * PERIOD, noise**2 * EVERY * PERIOD

@@ -1,1 +1,0 @@
-"""Gradients against differences, forward against reverse mode, and primal bits."""

@@ -1,1 +1,0 @@
-"""What tests compare with, each derived independently of the package."""

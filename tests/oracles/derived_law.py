@@ -193,6 +193,12 @@ def pressures_for(force: Any, stiffness: Any, y: Any, cylinder: Cylinder, rig: P
     return np.array([push / ap, (push - force) / an])
 
 
+def air_for(force: Array, stiffness: Array, piston: Array, rig: Parameters) -> Array:
+    """``pressures_for`` of both cylinders, (4, ...), from (2, ...)."""
+    each = zip(force, stiffness, piston, (rig.cylinder1, rig.cylinder2), strict=True)
+    return np.concatenate([pressures_for(*one, rig) for one in each])
+
+
 @cache
 def direct_derivatives() -> Callable[..., Any]:
     """x, y to their jerks for a motion of the joints: the Taylor series of (1) and the end effector, in SymPy."""

@@ -3,6 +3,7 @@
 What acceleration and jerk a law's openings give it: an independent truth for laws that ask for a jerk. Arrays are (rows, N).
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,32 +38,31 @@ def jacobians(piston: Array, rig: Parameters) -> Array:
     return np.stack(columns, axis=1).transpose(2, 0, 1)
 
 
+def rod_forces(rig: Parameters) -> Array:
+    """Of the atmosphere on the rods' sections, (2, 1), N."""
+    areas = [derived_law.areas(cylinder) for cylinder in (rig.cylinder1, rig.cylinder2)]
+    return -rig.air.atmospheric_pressure * np.diff(areas)
+
+
 def near_balance(rig: Parameters, lanes: int, seed: int, speed: float, push: float) -> Instant:
     """Random positions, speeds up to ``speed`` m/s and forces within ``push`` N of those that carry the weight."""
     rng = np.random.default_rng(seed)
     piston = rng.uniform([[-0.06], [-0.12]], [[0.06], [0.12]], (2, lanes))
     weight = np.array([0.0, rig.mechanics.mass * rig.mechanics.gravity])
-    pressures, stiffness = np.empty((4, lanes)), rng.uniform([[3500.0], [1800.0]], [[4500.0], [2300.0]], (2, lanes))
+    stiffness = rng.uniform([[3500.0], [1800.0]], [[4500.0], [2300.0]], (2, lanes))
     needed = (jacobians(piston, rig).transpose(0, 2, 1) @ weight).T + rng.uniform(-push, push, (2, lanes))
-    for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
-        ap, an = derived_law.areas(cylinder)
-        force = needed[i] + rig.air.atmospheric_pressure * (ap - an)
-        pressures[2 * i : 2 * i + 2] = derived_law.pressures_for(force, stiffness[i], piston[i], cylinder, rig)
+    pressures = derived_law.air_for(needed + rod_forces(rig), stiffness, piston, rig)
     return Instant(piston, rng.uniform(-speed, speed, (2, lanes)), pressures, stiffness)
 
 
 def seen(now: Instant, rig: Parameters, user_force: Array) -> Measurement:
     """What exact sensors say."""
-    blind = derived_law.seen(now.piston, now.speed, now.pressures, rig)
-    return Measurement(
-        blind.time, blind.position, blind.time, blind.velocity, blind.pressures, user_force, sampled=False
-    )  # fmt: skip
+    return replace(derived_law.seen(now.piston, now.speed, now.pressures, rig), user_force=user_force)
 
 
 def forces(pressures: Array, rig: Parameters) -> Array:
     """Of the chambers less that of the atmosphere, (2, N), N."""
-    rods = [[rig.air.atmospheric_pressure * np.subtract(*derived_law.areas(c))] for c in (rig.cylinder1, rig.cylinder2)]
-    return np.array(derived_law.forces(pressures, rig)) - np.array(rods)
+    return np.array(derived_law.forces(pressures, rig)) - rod_forces(rig)
 
 
 def force_rates(openings: Array, now: Instant, rig: Parameters) -> Array:

@@ -7,6 +7,7 @@ from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
+from tests.oracles import rigid_body
 from tests.physics.rigs import each_rig
 
 
@@ -20,8 +21,7 @@ def piston_lengths(x: mpmath.mpf, y: mpmath.mpf, rig: Parameters) -> tuple[mpmat
 
 def points(rig: Parameters, lanes: int, rng: np.random.Generator) -> Array:
     """End effector positions spread over both strokes."""
-    y1, y2 = rng.uniform([[-0.095], [-0.19]], [[0.095], [0.19]], (2, lanes))
-    return by_points.pose_from_lengths(y1 + rig.geometry.k1, y2 + rig.geometry.k2, rig.geometry).end_effector
+    return rigid_body.pose_of(rng.uniform([[-0.095], [-0.19]], [[0.095], [0.19]], (2, lanes)), rig).end_effector
 
 
 @each_rig
@@ -52,10 +52,9 @@ def test_piston_reference_is_the_inverse_geometry_and_its_three_derivatives(rig:
 def test_piston_motion_by_points(rig: Parameters) -> None:
     """Velocity of the linkage made of points, without the package's direct model."""
     rng = np.random.default_rng(3)
-    y1, y2 = rng.uniform([[-0.099], [-0.199]], [[0.099], [0.199]], (2, 200))
-    v1, v2 = rng.uniform(-2, 2, (2, 200))
-    pose = by_points.pose_from_lengths(y1 + rig.geometry.k1, y2 + rig.geometry.k2, rig.geometry)
-    velocity, _ = by_points.cartesian_velocity(pose, y2 + rig.geometry.k2, v1, v2)
+    piston, speed = rng.uniform([[-0.099], [-0.199]], [[0.099], [0.199]], (2, 200)), rng.uniform(-2, 2, (2, 200))
+    pose = rigid_body.pose_of(piston, rig)
+    velocity, _ = by_points.cartesian_velocity(pose, piston[1] + rig.geometry.k2, *speed)
     joints = np.empty((4, 200))
     piston_motion(np.concatenate([pose.end_effector, velocity]), Rig(parameter_column(rig)), joints, 200)
-    np.testing.assert_allclose(joints, [y1, y2, v1, v2], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(joints, [*piston, *speed], rtol=0, atol=1e-12)

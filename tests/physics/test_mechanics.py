@@ -11,16 +11,7 @@ from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.physics.rigs import NO_FRICTION, each_rig
-
-
-def moving_states(rig: Parameters, lanes: int, rng: np.random.Generator) -> Plant:
-    """A plant with lanes anywhere inside the strokes, moving, with any pressures."""
-    plant = Plant(rig, lanes)
-    plant.state[Y1] = rng.uniform(-0.98, 0.98, lanes) * rig.cylinder1.stroke / 2
-    plant.state[Y2] = rng.uniform(-0.98, 0.98, lanes) * rig.cylinder2.stroke / 2
-    plant.state[[V1, V2]] = rng.uniform(-1.5, 1.5, (2, lanes))
-    plant.state[[PP1, PN1, PP2, PN2]] = rng.uniform(1e5, 7e5, (4, lanes))
-    return plant
+from tests.physics.test_dynamics import anywhere
 
 
 def bore_force(cylinder: Cylinder, pp: Array, pn: Array, atmosphere: float) -> Array:
@@ -32,11 +23,10 @@ def bore_force(cylinder: Cylinder, pp: Array, pn: Array, atmosphere: float) -> A
 @each_rig
 def test_newtons_law_holds_at_the_end_effector(rig: Parameters) -> None:
     """m a = rod forces along the rods of the linkage made of points + weight + user force."""
-    lanes, rng, rig = 300, np.random.default_rng(1), rig.replace(NO_FRICTION)
-    plant = moving_states(rig, lanes, rng)
-    user = rng.uniform(-200, 200, (2, lanes))
+    rig = rig.replace(NO_FRICTION)
+    plant, command, user = anywhere(rig, 300, 1)
     s = plant.state
-    rates = plant.derivatives(s, np.zeros((4, lanes)), user)
+    rates = plant.derivatives(s, command, user)
     r4, r2 = s[Y1] + rig.geometry.k1, s[Y2] + rig.geometry.k2
     pose = by_points.pose_from_lengths(r4, r2, rig.geometry)
     acceleration = by_points.cartesian_acceleration(pose, r4, r2, s[V1], s[V2], rates[V1], rates[V2])

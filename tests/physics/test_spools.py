@@ -6,11 +6,10 @@ import pytest
 
 from birthsim_env.physics import spools
 from birthsim_env.physics.compiled.lanes import DEADBAND, parameter_array
-from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.accuracy.motions import PERIOD, PERIODS, strong
-from studies.accuracy.second_model import SecondModel
+from tests.physics.test_second_model import start
 
 CIRCLE = "BirthSIM/Circle-v1"
 WORN = {"valves.deadband": 0.05, "valves.hysteresis": 0.04, "valves.opening_limit": 0.7}
@@ -46,10 +45,8 @@ def test_openings_are_those_of_the_stop_operator_and_the_characteristic(worn):
 
 def test_a_worn_plant_moves_as_the_second_model_behind_another_spool():
     rig = Parameters().replace(WORN)
-    plant, perfect, spool = Plant(rig), Plant(), OtherSpool(0.05, 0.04, 0.7)
-    plant.state[:] = balanced_state(plant.lane_parameters, np.zeros((2, 1)), np.zeros((2, 1)))
-    perfect.state[:] = plant.state
-    model = SecondModel(Parameters(), plant.end_effector()[:, 0], plant.state[:, 0])
+    plant, (perfect, model), spool = Plant(rig), start(Parameters()), OtherSpool(*WORN.values())
+    plant.state[:] = perfect.state
     for k in range(PERIODS):
         command, push = strong(k)
         model.advance(spool(command), push, PERIOD)

@@ -17,14 +17,14 @@ from agents.residual.authority import (
 from birthsim_env.loop.signals import REFERENCES, Joints, Reference
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles import linkage_by_points as by_points
+from tests.oracles import rigid_body
 
 PERIOD = 1e-3
 TIMES = PERIOD * np.arange(1500)
 RIG = Parameters()
 PISTON = np.array([[0.02], [-0.05]])
-POSE = by_points.pose_from_lengths(PISTON[0] + RIG.geometry.k1, PISTON[1] + RIG.geometry.k2, RIG.geometry)
-SIZES = [np.hypot(*by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, 1.0 - i, float(i))[0]) for i in range(2)]
+JACOBIAN = rigid_body.jacobians(PISTON, RIG)[0]
+SIZES = np.hypot(*JACOBIAN)
 """Speed of the end effector per speed of each piston."""
 
 
@@ -38,7 +38,7 @@ def watched(limiter: Limiter, speeds: Array, targets: Array | None = None) -> Ar
     for k, speed in enumerate(speeds):
         rows = np.zeros((REFERENCES, lanes))
         if targets is not None:
-            rows[2:4], _ = by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, *targets[k])
+            rows[2:4] = JACOBIAN @ targets[k]
         joints = Joints(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]))
         limit_authority(joints, Reference(rows), Rig(parameter_column(RIG)), PERIOD, LEVEL, limiter, lanes)
         fractions.append(limiter.left.copy())

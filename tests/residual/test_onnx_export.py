@@ -1,6 +1,8 @@
 """The exported policy is the policy: PyTorch, NumPy and onnxruntime agree, and the file says what it is."""
 
 import json
+import re
+import sys
 from dataclasses import replace
 
 import gymnasium
@@ -10,12 +12,15 @@ import onnxruntime
 import pytest
 import torch
 
+import agents
 from agents.policy import onnx_export
+from agents.policy.controller import ResidualController
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
 from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx
 from agents.residual.law import action_names, observation_names
 from agents.residual.settings import ResidualSettings
+from tests.console import call
 from tests.residual.policies import ENVIRONMENT, SETTINGS, network, policy
 
 
@@ -149,3 +154,30 @@ def test_a_network_of_other_settings_is_refused(tmp_path):
     with pytest.raises(ValueError, match="policy maps 32 to 2 numbers; allowed: 38 to 5"):
         export_onnx(Policy(network(), ENVIRONMENT, variable, {}), tmp_path / "policy.onnx")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_path, monkeypatch, capsys):
+    status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder)
+    assert (status, complaint) == (0, "")
+    written = folder / "policy.onnx"
+    assert f"{written}: {written.stat().st_size} bytes, 32 observation entries to 2 actions" in printed
+    assert "over 3000 observations" in printed
+    assert re.search(r": \S+ from PyTorch, \S+ from NumPy; allowed: 1.19209e-07\n", printed)
+    elsewhere = tmp_path / "new" / "folder" / "mine.onnx"
+    status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder, "--out", elsewhere)
+    assert (status, complaint) == (0, "")
+    assert str(elsewhere) in printed
+    assert elsewhere.read_bytes() == written.read_bytes()
+    # The folder is still a policy's.
+    ResidualController(policy=folder)
+
+
+@pytest.mark.parametrize("missing", ["onnx", "onnxruntime", "torch"])
+def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
+    monkeypatch.delitem(sys.modules, "agents.policy.onnx_export")
+    monkeypatch.delattr(agents.policy, "onnx_export")
+    monkeypatch.setitem(sys.modules, missing, None)
+    status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder)
+    assert (status, printed, complaint.count("\n")) == (2, "", 1)
+    assert missing in complaint
+    assert "extras agents and onnx: pip install 'birthsim[agents,onnx]'" in complaint

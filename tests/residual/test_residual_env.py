@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from agents.residual import authority
-from agents.residual.env import ResidualEnv, ResidualVectorEnv
 from agents.residual.law import ResidualActuation, ResidualLaw
-from agents.residual.settings import IMPEDANCES, LAWS
+from agents.residual.settings import FORCE_LAWS, IMPEDANCES, LAWS
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
@@ -21,16 +20,12 @@ CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 RIG = Parameters()
 
 
-def single(name=CIRCLE, **arguments) -> ResidualEnv:
-    env = gymnasium.make(name, **arguments).unwrapped
-    assert type(env) is ResidualEnv
-    return env
+def single(name=CIRCLE, **arguments):
+    return gymnasium.make(name, **arguments).unwrapped
 
 
-def lanes(count=3, name=CIRCLE, **arguments) -> ResidualVectorEnv:
-    env = gymnasium.make_vec(name, num_envs=count, **{"autoreset_mode": "SameStep", **arguments})
-    assert type(env) is ResidualVectorEnv
-    return env
+def lanes(count, name=CIRCLE, **arguments):
+    return gymnasium.make_vec(name, num_envs=count, autoreset_mode="SameStep", **arguments)
 
 
 def random_actions(steps, count, size=2, seed=0):
@@ -70,8 +65,10 @@ def assert_follows(env, actions, rows, seed):
 def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
-    for impedance, size in IMPEDANCES.items() if law.startswith("backstepping") else [("fixed", 2)]:
-        env = single(law=law, impedance=impedance, **arguments)
+    settings = [(size, {"impedance": name}) for name, size in IMPEDANCES.items() if size == 2 or law.startswith("backstepping")]
+    settings += [(2, {"informed": True}), *([] if law in FORCE_LAWS else [(2, {"force_sensor": False})])]
+    for size, more in settings:
+        env = single(law=law, **more, **arguments)
         assert_follows(env, np.zeros((140, size), np.float32), rows, seed=3)
     # It was no standstill: the first push has come.
     assert np.abs(rows[-1][1]["user_force"]).max() > 5

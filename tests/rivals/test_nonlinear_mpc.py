@@ -58,7 +58,7 @@ def linearised(plan: Array, given: Situation) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("limits", ["none", "some", "nearly all"])
 def test_a_better_plan_is_the_bounded_least_squares_solution(limits: str) -> None:
-    """By SciPy's active-set method, of the least squares whose slopes are Cholesky's factor; lanes change nothing."""
+    """By SciPy's active-set method, of the least squares whose slopes are Cholesky's factor."""
     lanes, scale = 8, {"none": 1e3, "some": 1.0, "nearly all": 0.02}[limits]
     low, high = bounds(scale, lanes)
     start = FLOW * np.random.default_rng(1).normal(0, 0.2, (SIZE, lanes))
@@ -75,9 +75,6 @@ def test_a_better_plan_is_the_bounded_least_squares_solution(limits: str) -> Non
         exact = lsq_linear(factor.T, wanted, sides, method="bvls", tol=1e-14)
         np.testing.assert_allclose(found[:, lane], exact.x, rtol=0, atol=1e-6 * max(FLOW, np.abs(exact.x).max()))
         active.append(np.mean(exact.active_mask != 0))
-        alone = start[:, lane : lane + 1].copy()
-        minimise(*(np.ascontiguousarray(part[:, lane : lane + 1]) for part in (h, c, low, high)), alone, 1)
-        assert np.array_equal(alone[:, 0], found[:, lane])
     least, most = {"none": (0.0, 0.0), "some": (0.05, 0.8), "nearly all": (0.85, 1.0)}[limits]
     assert least <= np.mean(active) <= most
 

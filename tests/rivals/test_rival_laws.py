@@ -108,12 +108,7 @@ def test_pid_openings_step_by_step() -> None:
     error, error_rate = np.array([2e-4, -1.5e-4]), np.array([0.002, -0.003])
     piston, speed = wanted[:2, 0] - error, -error_rate
     needed = prepared(wanted, np.zeros((2, 1)), rig, 0.5)[:, 0]
-    pressures = np.concatenate(
-        [
-            derived.pressures_for(needed[i] + 4.0, 1.01 * closed_loop.PNEUMATIC_STIFFNESS[i, 0], piston[i], cylinder, rig)
-            for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2))
-        ]
-    )
+    pressures = derived.air_for(needed[:2] + 4.0, 1.01 * closed_loop.PNEUMATIC_STIFFNESS[:, 0], piston, rig)
     measured = derived.seen(piston[:, None], speed[:, None], pressures[:, None], rig)
     held = np.array(derived.forces(pressures, rig)) - needed[:2]
     scale = np.array([needed[4], 1.0])
@@ -215,11 +210,9 @@ def beside_rest(rig: Parameters, offset: Array) -> tuple[Array, Reference, Array
     reference = derived.cartesian(wanted, rig)
     reference.rows[8:10], reference.rows[10:12] = 2000.0, closed_loop.PNEUMATIC_STIFFNESS
     needed = prepared(wanted, np.zeros((2, 1)), rig, 0.0)[:, 0]
-    air = [
-        derived.pressures_for(needed[i], closed_loop.PNEUMATIC_STIFFNESS[i, 0], wanted[i, 0] + offset[i], cylinder, rig)
-        for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2))
-    ]
-    start = np.concatenate([wanted[:2, 0] + offset, np.zeros(2), *air])
+    piston = wanted[:2, 0] + offset
+    air = derived.air_for(needed[:2], closed_loop.PNEUMATIC_STIFFNESS[:, 0], piston, rig)
+    start = np.concatenate([piston, np.zeros(2), air])
     return start, reference, needed[:2], np.array([needed[4], 1.0])
 
 

@@ -1,6 +1,5 @@
 """The schedule of least air: its model against the equations solved anew, its choice against all others, its bounds."""
 
-import math
 import subprocess
 import sys
 from itertools import product
@@ -13,6 +12,7 @@ from birthsim_env import Circle, Hold, Parameters, Path, StiffnessSchedule
 from studies.least_air import schedule as module
 from studies.least_air.schedule import GRID, least_air, supplied
 from tests.console import ROOT, call, strict
+from tests.oracles import derived_law
 
 RIG = Parameters()
 PUSHES = [(20.0, 0.0), (-20.0, 0.0), (0.0, 20.0), (0.0, -20.0)]
@@ -25,18 +25,15 @@ def course(schedule, times):
 
 
 def iso(up, down):
-    """ISO 6358 of a shut valve at the room's temperature, below the laminar range."""
-    x = down / up
-    psi = 1.0 if x <= 0.3 else math.sqrt(1 - ((x - 0.3) / 0.7) ** 2)
-    return 0.005 * 3.9e-9 * 1.185 * up * psi
+    """Through a shut valve."""
+    return derived_law.orifice(RIG.valves.leakage_ratio * RIG.valves.sonic_conductance, up, down, RIG)
 
 
 def chambers(k, y, force, stiffness):
-    """Pressures that have this force and this stiffness (9): two linear equations."""
+    """Pressures that have this force and this stiffness (9), and volumes."""
     one = (RIG.cylinder1, RIG.cylinder2)[k]
-    lp, ln = one.stroke / 2 + y, one.stroke / 2 - y
-    rows = [[one.area_p, -one.area_n], [1.2 * one.area_p / lp, 1.2 * one.area_n / ln]]
-    return np.linalg.solve(rows, [force, stiffness]), (1e-5 + one.area_p * lp, 1e-5 + one.area_n * ln)
+    lengths = np.array([one.stroke / 2 + y, one.stroke / 2 - y])
+    return derived_law.pressures_for(force, stiffness, y, one, RIG), 1e-5 + np.array(derived_law.areas(one)) * lengths
 
 
 @pytest.mark.parametrize("k", [0, 1])

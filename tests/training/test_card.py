@@ -8,13 +8,12 @@ from agents.policy.seeds import SHIPPED, best_policy, shipped_names
 from agents.reports.card import FIGURES, TRAINING, compared, model_card
 from baselines.bench.evaluation import Evaluation
 from tests.console import call
+from tests.training.test_seeds import evaluation
 
 
 def measured(controller: str, settled: list[float], air: float) -> Evaluation:
     """Three episodes with one of them beyond the rig's strength, and no figure but these and zeros."""
-    one = Evaluation(controller, [1, 2, 3], lost=[False, False, False], required_strength_ratio=[0.5, 0.5, 1.5])
-    for values in one.metrics.values():
-        values += [0.0] * 3
+    one = evaluation(controller, [0.0] * 3, beyond=[2])
     one.metrics |= {"settled_rms": settled, "air": [air] * 3, "stiffness_error": [float("nan")] * 3}
     return one
 

@@ -1,1 +1,0 @@
-"""Compilation, and functions with the same bits everywhere."""

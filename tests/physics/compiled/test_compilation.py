@@ -36,19 +36,10 @@ print(1e3 * x[0])
 def package(tmp_path):
     """A copy of the few modules that one small kernel needs."""
     folder = tmp_path / "birthsim_env"
-    folder.mkdir()
-    for name in (
-        "files",
-        "loop/signals",
-        *(f"physics/{part}" for part in ("electronics", "valves")),
-        *(
-            f"physics/compiled/{part}"
-            for part in ("compilation", "kept", "lanes", "exact", "records", "record_types", "resolution", "sources")
-        ),
-        *(f"physics/rig/{part}" for part in ("parameters", "quantities", "reading", "sections", "values")),
-    ):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)
+    for path in dependencies([ROOT / "birthsim_env" / name for name in ("loop/signals.py", "physics/compiled/compilation.py")]):
+        if path.name != "__init__.py":
+            (tmp_path / path.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, tmp_path / path.relative_to(ROOT))
     for room in (folder, *(path for path in folder.rglob("*") if path.is_dir())):
         (room / "__init__.py").touch()
     (folder / "probe.py").write_text(PROBE)

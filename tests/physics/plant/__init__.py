@@ -1,1 +1,0 @@
-"""The whole plant: its motion, balances, limits and options."""

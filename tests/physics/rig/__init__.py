@@ -1,1 +1,0 @@
-"""What describes a rig."""
