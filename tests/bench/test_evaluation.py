@@ -19,12 +19,11 @@ RIG = Parameters()
 
 
 class Spy:
-    """A law of which every call is written down; ``after`` calls it raises KeyboardInterrupt."""
+    """A law whose calls are counted; after ``interrupt_at`` of them it raises KeyboardInterrupt."""
 
     def __init__(self, law=None, interrupt_at=None):
         self.law = law or BacksteppingController()
-        self.interrupt_at, self.calls, self.resets = interrupt_at, 0, 0
-        self.references, self.forces, self.keys, self.commands = [], [], [], []
+        self.interrupt_at, self.calls, self.resets, self.commands = interrupt_at, 0, 0, []
 
     def reset(self, lanes=None):
         self.resets += 1
@@ -34,8 +33,6 @@ class Spy:
         if self.calls == self.interrupt_at:
             raise KeyboardInterrupt
         self.calls += 1
-        self.references.append(reference.rows.copy())
-        self.forces.append(measurement.user_force.copy())
         self.commands.append(self.law.command(measurement, reference))
         return self.commands[-1]
 

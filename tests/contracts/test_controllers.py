@@ -28,8 +28,6 @@ CASES = [
     for name in NAMES for sensors in SENSORS
 ]  # fmt: skip
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
-RANDOM = {"random-valves"}
-"""Its openings are drawn from one stream for all lanes."""
 CONTROLLED = [name for name in NAMES if not name.endswith("-valves")]
 
 
@@ -58,12 +56,6 @@ def recorded(law, sensors, rig, lanes, ticks):
     return signals, commands
 
 
-def lane_of(signals, lane):
-    measured, wanted, given = signals
-    told_of = {name: value[..., lane] for name, value in given.items()}
-    return (closed_loop.of_lanes(measured, lane), Reference(wanted.rows[:, lane])), told_of
-
-
 @pytest.mark.parametrize(("name", "sensors", "rig"), CASES)
 def test_one_rig_is_a_lane_of_many_and_a_reset_starts_it_alone(name, sensors, rig):
     """Of the first and of the next block of lanes; told of no force a law is the one that nothing is told, to the bit."""
@@ -79,11 +71,12 @@ def test_one_rig_is_a_lane_of_many_and_a_reset_starts_it_alone(name, sensors, ri
         got = reset.command(*pair, **given)
         assert got.shape == (4, lanes)
         assert np.abs(got).max() <= 1.0
-        if name in RANDOM:
+        if name == "random-valves":  # drawn from one stream for all lanes
             continue
         np.testing.assert_array_equal(got[:, ~fresh], expected[:, ~fresh])
         for lane, one, new in zip(chosen, single, late, strict=True):
-            own, of_own = lane_of((*pair, given), lane)
+            own = closed_loop.of_lanes(pair[0], lane), Reference(pair[1].rows[:, lane])
+            of_own = {option: value[..., lane] for option, value in given.items()}
             np.testing.assert_array_equal(one.command(*own, **of_own), expected[:, lane])
             if tick >= ticks // 3:
                 np.testing.assert_array_equal(got[:, lane], new.command(*own, **of_own))

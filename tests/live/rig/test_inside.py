@@ -9,7 +9,6 @@ from birthsim_env.physics.geometry import amplification
 from birthsim_live.rig.stages import INSIDE, look_inside
 
 FRICTION = [getattr(lanes, name) for name in ("FC1", "FC2", "FS1", "FS2", "FV1", "FV2", "BRISTLE_S0", "BRISTLE_S1")]
-TEMPERATURES = [lanes.TP1, lanes.TN1, lanes.TP2, lanes.TN2]
 
 
 def moving_plant(law):
@@ -52,7 +51,7 @@ def test_flows_are_those_that_fill_the_chambers():
         lengths = halves + np.repeat(plant.piston[:, 0], 2) * [1, -1, 1, -1]
         areas = [rig.cylinder1.area_p, rig.cylinder1.area_n, rig.cylinder2.area_p, rig.cylinder2.area_n]
         volumes = rig.chambers.dead_volume + areas * lengths
-        return plant.pressures[:, 0] * volumes / (rig.air.gas_constant * plant.state[TEMPERATURES, 0])
+        return plant.pressures[:, 0] * volumes / (rig.air.gas_constant * plant.temperatures[:, 0])
 
     before = masses()
     plant.advance(plant.state[-4:].copy(), np.zeros((2, 1)), step)
