@@ -95,16 +95,6 @@ def test_rendered_matrices_on_the_frictionless_plant(monkeypatch: pytest.MonkeyP
     assert theirs.max() > 0.3, "measured: 0.35"
 
 
-def test_large_pushes_find_the_same_spring() -> None:
-    """10 to 40 mm of displacement, where the linkage turns: the spring is Cartesian, not one of the pistons."""
-    force = np.array([[20.0, 40.0, 60.0, 30.0], [10.0, -15.0, 25.0, 60.0]])
-    stiffness = np.repeat([[3000.0], [1500.0], [800.0]], 4, axis=1)
-    place = np.repeat([[0.5], [-0.02]], 4, axis=1)
-    answers = run_stiffness_test(StiffnessTest(place, force, stiffness, FRICTIONLESS), CartesianBackstepping(FRICTIONLESS))
-    assert np.hypot(*answers.expected).max() > 0.03
-    np.testing.assert_allclose(answers.displacement, answers.expected, rtol=0, atol=2e-5)
-
-
 def test_setpoints_without_gains_are_refused() -> None:
     """So soft that viscous friction would turn the loop's own stiffness round."""
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 2, axis=1), 2000.0)

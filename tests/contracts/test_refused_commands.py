@@ -120,6 +120,7 @@ TABLE = {
     "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to onnx circle --out own": "'own' is a folder; allowed: the name of a file",
     "export --to onnx circle --out own.py/policy.onnx": "'own.py': File exists",
+    "figure4 --set gain --out x": "--set 'gain'; allowed: GAIN=VALUE",
     "export --to fmux": "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help",
     "export --to stone": "--to 'stone'; allowed: onnx, hub, minari, wasm, ",
     "export": "--to is missing; allowed: onnx, hub, minari, wasm, ",

@@ -1,7 +1,5 @@
 """The law behind the admittance: the jerk that it gives, resting pistons, gains at rest, valve lead, and gains that yield."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -28,43 +26,31 @@ def remembered(lanes: int) -> Memory:
     return Memory(np.repeat(fresh_memory(Parameters(), False)[:, None], lanes, axis=1))
 
 
-@dataclasses.dataclass
-class Law:
-    """The kernel with everything that is not under test at rest; ``command`` gives openings (4, N).
+REST = {
+    "pneumatic_gain": 30.0, "gain": 60.0, "rest_gain": 60.0, "rest_push": 1.0, "dead_zone": 0.0, "oscillation": 0.06,
+    "swing": 0.0, "yielding": 0.9, "least_fraction": LEAST_FRACTION, "most_falls": 1.0,
+}  # fmt: skip
+"""Gains of a law of which nothing is under test."""
 
-    Without ``lead_time`` and with shut spools they are those that the law wants.
-    """
 
-    rig: Parameters
-    gain: float = 60.0
-    rest_gain: float = 60.0
-    dead_zone: float = 0.0
-    rest_push: float = 1.0
-    lead_time: float | None = None
-
-    def command(
-        self, now: rigid_body.Instant, motion: Array, user: Array, disturbance_force: Array,
-        rest: Array | None = None, moving: float = 1.0, memory: Memory | None = None, spools: Array | None = None,
-        told: Array | None = None, pneumatic: Array | None = None,
-    ) -> Array:  # fmt: skip
-        lanes = motion.shape[1]
-        seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))
-        memory = remembered(lanes) if memory is None else memory
-        memory.inertia.mass[:], known.given.inverse_mass[:] = self.rig.mechanics.mass, 1.0 / self.rig.mechanics.mass
-        seen.asked.rows[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
-        seen.feedforward.rows[:] = 0.0 if told is None else told
-        memory.joints.position[:], memory.joints.speed[:], memory.chambers.pressure[:] = now.piston, now.speed, now.pressures
-        memory.chambers.spool[:], memory.pistons.rest[:] = 0.0 if spools is None else spools, 0.0 if rest is None else rest
-        known.motion.rows[:], known.given.force[:], known.unseen[:] = motion, user, disturbance_force
-        known.given.moving[:] = moving
-        # A spool that follows as fast as it does by itself is told where to go, no further.
-        quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
-        gains = Gains.numbers(
-            pneumatic_gain=30.0, gain=self.gain, rest_gain=self.rest_gain, rest_push=self.rest_push, dead_zone=self.dead_zone,
-            quickness=quickness, oscillation=0.06, swing=0.0, yielding=0.9, least_fraction=LEAST_FRACTION, most_falls=1.0,
-        )  # fmt: skip
-        admittance_law.command(seen, memory, known, Gains(gains), Belief(belief(self.rig)))
-        return seen.opening
+def commanded(
+    rig, now, motion, user=0.0, unseen=0.0, memory=None, told=0.0, spools=0.0, rest=0.0, moving=1.0, pneumatic=None,
+    lead_time=None, **gains
+):  # fmt: skip
+    """Openings (4, N) of the kernel; without ``lead_time`` and with shut spools they are those that the law wants."""
+    lanes = motion.shape[1]
+    seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))
+    memory = remembered(lanes) if memory is None else memory
+    memory.inertia.mass[:], known.given.inverse_mass[:] = rig.mechanics.mass, 1.0 / rig.mechanics.mass
+    seen.asked.rows[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
+    memory.joints.position[:], memory.joints.speed[:], memory.chambers.pressure[:] = now.piston, now.speed, now.pressures
+    memory.chambers.spool[:], memory.pistons.rest[:], seen.feedforward.rows[:] = spools, rest, told
+    known.motion.rows[:], known.given.force[:], known.unseen[:], known.given.moving[:] = motion, user, unseen, moving
+    # A spool that follows as fast as it does by itself is told where to go, no further.
+    quickness = 1 - np.exp(-PERIOD / (lead_time or rig.valves.time_constant))
+    numbers = Gains.numbers(quickness=quickness, **(REST | gains))
+    admittance_law.command(seen, memory, known, Gains(numbers), Belief(belief(rig)))
+    return seen.opening
 
 
 def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, fraction: float = 1.0) -> tuple[Array, Measurement]:
@@ -85,7 +71,7 @@ def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters, fra
     user, disturbance_force = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
     told = fraction * np.concatenate([rng.uniform(-4, 4, (2, lanes)), rng.uniform(-200, 200, (2, lanes))])
     motion, measured = near(now, rig, user, seed=1)
-    openings = Law(rig, c).command(now, motion, user, disturbance_force, told=told)
+    openings = commanded(rig, now, motion, user, disturbance_force, told=told, gain=c)
     free = np.abs(openings).max(axis=0) < 1
     assert free.sum() > 0.7 * lanes
     a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, disturbance_force + told[:2], user)
@@ -113,7 +99,7 @@ def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int, resting: f
     rest[cylinder] = resting
 
     def jerks(**changes: Array) -> Array:
-        openings = Law(rig, 50.0, 50.0, zone, push).command(now, motion, nothing, nothing, **changes)
+        openings = commanded(rig, now, motion, gain=50.0, rest_gain=50.0, dead_zone=zone, rest_push=push, **changes)
         assert np.abs(openings).max() < 1
         a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)
         assert np.abs(a).max() < 1e-9
@@ -135,10 +121,10 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
     nothing = np.zeros((2, lanes))
     motion, _ = near(now, rig, nothing, seed=1, fraction=0.0)
     motion[0] -= error
-    law, memory, stiffnesses = Law(rig, 60.0, 30.0), remembered(lanes), []
+    memory, stiffnesses = remembered(lanes), []
     for tick in range(400):
         moving = float(tick in (0, 399))
-        openings = law.command(now, motion, nothing, nothing, moving=moving, memory=memory)
+        openings = commanded(rig, now, motion, moving=moving, memory=memory, rest_gain=30.0)
         stiffnesses.append(-rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1][0, 0] / error)
     decay = np.exp(-PERIOD * np.arange(399) / 0.1)
     c = 30.0 + 30.0 * decay
@@ -153,9 +139,9 @@ def test_the_law_leads_every_spool_from_where_it_is(lead_time: float) -> None:
     now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.05, push=3.0)
     nothing = np.zeros((2, lanes))
     motion, _ = near(now, rig, nothing, seed=1)
-    wanted = Law(rig).command(now, motion, nothing, nothing)
+    wanted = commanded(rig, now, motion)
     spools = wanted + np.random.default_rng(3).uniform(-0.1, 0.1, wanted.shape)
-    openings = Law(rig, lead_time=lead_time).command(now, motion, nothing, nothing, spools=spools)
+    openings = commanded(rig, now, motion, spools=spools, lead_time=lead_time)
     free = np.abs(openings) < 1
     assert free.mean() > 0.7
     plant = Plant(rig, lanes)
@@ -212,17 +198,17 @@ def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(di
     """After five half waves of the speed error in one direction: c 0.9^3 there, jerk by jerk, and c in the other one."""
     rig, c, error = Parameters(), 50.0, 5e-5
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
-    nothing, law, memory, pose = np.zeros((2, 1)), Law(rig, 50.0, 50.0), remembered(1), rigid_body.pose_of(now.piston, rig)
+    nothing, memory, pose = np.zeros((2, 1)), remembered(1), rigid_body.pose_of(now.piston, rig)
     resting, _ = near(now, rig, nothing, seed=1, fraction=0.0)
     shaken = {"across": pose.across, "along": pose.beam}[direction]
     for time in TIMES[:245]:
         motion = resting.copy()
         motion[2:4] += 0.1 * np.sin(2 * np.pi * 10.0 * time) * shaken
-        law.command(now, motion, nothing, nothing, memory=memory)
+        commanded(rig, now, motion, memory=memory, gain=c, rest_gain=c)
     for way in (pose.across, pose.beam):
         motion = resting.copy()
         motion[:2] -= error * way
-        openings = law.command(now, motion, nothing, nothing, memory=Memory(memory.rows.copy()))
+        openings = commanded(rig, now, motion, memory=Memory(memory.rows.copy()), gain=c, rest_gain=c)
         jerk = (rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1] * way).sum()
         left = 0.9**3 * c if way is shaken else c
         assert -jerk / error == pytest.approx(left**3 + 2 * left, rel=1e-4)

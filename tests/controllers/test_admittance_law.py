@@ -6,7 +6,7 @@ import pytest
 from baselines.admittance import law
 from baselines.admittance.rows import HalfWave
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.controllers.test_admittance_backstepping import PERIOD, Law, near
+from tests.controllers.test_admittance_backstepping import PERIOD, commanded, near
 from tests.oracles import derived_law as derived
 from tests.oracles import rigid_body
 
@@ -18,7 +18,7 @@ def test_the_pneumatic_stiffness_goes_where_the_reference_asks_at_c4() -> None:
     nothing = np.zeros((2, lanes))
     error, rate = rng.uniform(-20, 20, (2, lanes)), rng.uniform([[-300.0], [400.0]], [[-100.0], [700.0]], (2, lanes))
     motion, _ = near(now, rig, nothing, seed=1, fraction=0.1)
-    openings = Law(rig).command(now, motion, nothing, nothing, pneumatic=np.concatenate([now.stiffness - error, rate]))
+    openings = commanded(rig, now, motion, pneumatic=np.concatenate([now.stiffness - error, rate]))
     driven = (now.pressures > 1.1e5) & (now.pressures < 6.9e5)
     free = np.all((np.abs(openings) < 0.99) & driven, axis=0)
     assert free.sum() > 0.5 * lanes
@@ -72,7 +72,7 @@ def test_position_errors_count_up_to_six_millimetres() -> None:
         motion, _ = near(now, rig, nothing, seed=1, fraction=0.0)
         # Along cylinder 2, by a gain at which no valve saturates.
         motion[:2] += error * (motion[:2] / np.linalg.norm(motion[:2], axis=0))
-        openings = Law(rig, 10.0).command(now, motion, nothing, nothing)
+        openings = commanded(rig, now, motion, gain=10.0)
         assert np.abs(openings).max() < 1
         jerks.append(np.linalg.norm(rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1]))
     np.testing.assert_allclose(jerks, 1020 * np.array([0.0059, 0.006, 0.006, 0.006]), rtol=1e-4)

@@ -89,7 +89,7 @@ BAD: dict[str, tuple[dict[str, Callable[[Array], Array] | None], str]] = {
             "row 1000: 51 ms after the row before, others 1 ms; allowed: evenly spaced rows"),
     "volts": ({"openings": lambda v: 5 * v + 5}, "they look like V: an opening is (V - 5) / 5 where 5 V is shut"),
     "percent": ({"openings": lambda v: 100 * v}, "they look like percent: an opening is percent / 100"),
-    "valve": ({"openings_N2": still}, "openings_N2 never changes; allowed: valves that move, as in birthsim identify --prop"),
+    "valve": ({"openings_N2": still}, "openings_N2 never changes; allowed: valves that move, as in birthsim identify "),
     "bar": ({"pressures": lambda v: 1e-5 * v}, "they look like bar, allowed: absolute pressures in Pa"),
     "kPa": ({"pressures": lambda v: 1e-3 * v}, "they look like kPa, allowed: absolute pressures in Pa"),
     "gauge": ({"pressures": lambda v: v - 101300.0}, "they look like gauge pressures, allowed: absolute pressures in Pa"),

@@ -67,7 +67,6 @@ def test_plant_moves_like_the_second_model(
     changes: dict[str, object], sequence: Motion, refinement: int, allowed: tuple[float, float]
 ) -> None:
     worst, speeds = differences(Parameters().replace(changes), sequence, refinement)
-    print(f"position {worst[0]:.1e} m, pressure {worst[1]:.1e}; speeds up to {np.abs(speeds).max(axis=0)}")
     assert np.all(worst < allowed), worst
     if sequence is stick_slip:
         assert np.all((np.abs(speeds) < 1e-3).mean(axis=0) > 0.05), "must stick at times"
