@@ -61,7 +61,7 @@ class Problem:
         self.spread: Array = np.array([one.spread for one in quantities])
         self._start: Array = np.zeros((len(windows.starts), len(FREE)))
         self.offsets = Offsets(windows, noise, owner.electronics)
-        self._at: tuple[bytes, Array, Array, Array] = (b"", *[self._start] * 3)
+        self._at: tuple[bytes, Array, Array, Array] = (b"", self._start, self._start, self._start)
         self.slopes: Slopes | None = None
         self.derivatives: Array = np.empty(0)
 
@@ -98,17 +98,18 @@ class Problem:
         """Their derivatives, (W (R + 14) + E + Q, Q), less what start states and offsets make up for: one lane a parameter and
         window."""
         self._start, residual = self.settled(theta)
-        self._linearize(self.rig_at(theta))
+        slopes = self._linearize(self.rig_at(theta))
         moved = theta + DIFFERENCE * np.eye(len(theta))
         rigs = [self.rig_at(one) for one in moved]
         found = predicted(self.offsets.corrected(), self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
-        own = self.slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
+        own = slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
         self.derivatives, bent = self.offsets.unexplained(own)
         return np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
 
-    def _linearize(self, rig: Parameters) -> None:
+    def _linearize(self, rig: Parameters) -> Slopes:
         self.slopes = slopes_at(self.windows, self.noise, rig, self._start)
         self.offsets.linearize(self.slopes)
+        return self.slopes
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class Offsets:
         gradient = np.einsum("wre,wr->e", self._left, residual) + self.sizes
         step = -self._inverse @ gradient
         self.sizes = self.sizes + step
-        return float(-gradient @ step) ** 0.5
+        return float(np.sqrt(-gradient @ step))
 
     def unexplained(self, columns: Array) -> tuple[Array, Array]:
         """What the errors cannot explain of columns (W, R + 14, Q), and the columns of their ``sizes`` as residuals, (E, Q)."""
