@@ -9,6 +9,7 @@ evaluation solves for them (variable projection), and the search sees the parame
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from baselines.identification.starts import Noise, Slopes
 from baselines.identification.windows import FREE, Windows
@@ -24,6 +25,10 @@ REACH = 0.15
 WIDER = 2.0
 """Standard deviation of a term over the field's RMS: a wave of 0.6 m has terms so large at ``REACH``."""
 
+DEGREE, SAMPLES = 5, 4
+"""Degree of a polynomial of time through a window's positions, and samples for each, at least. The field is taken there: at noisy
+positions a field that shrinks the workspace would shrink the noise."""
+
 LEAST = 1e-9
 """Pa and m: smaller errors are taken for this."""
 
@@ -32,7 +37,7 @@ class Offsets:
     """The errors in some ``windows``. ``sizes`` (E,) are in standard deviations of what is known before."""
 
     def __init__(self, windows: Windows, noise: Noise, board: Electronics) -> None:
-        u, v = np.moveaxis((windows.positions - (board.registration_x, board.registration_y)) / REACH, -1, 0)
+        u, v = np.moveaxis((_smooth(windows) - (board.registration_x, board.registration_y)) / REACH, -1, 0)
         terms = max(WIDER * board.position_distortion, LEAST) * np.stack([u**i * v**k for i, k in POWERS], axis=-1)
         terms = np.where(windows.valid[..., None], terms, 0.0)
         count, cells = len(terms), 4
@@ -68,3 +73,13 @@ class Offsets:
         """What the errors cannot explain of columns (W, R + 14, Q), and the columns of their ``sizes`` as residuals, (E, Q)."""
         along = self._inverse @ np.tensordot(self._left, columns, axes=((0, 1), (0, 1)))
         return columns - self._left @ along, -along
+
+
+def _smooth(windows: Windows) -> Array:
+    """Positions (W, F, 2) without most of the noise."""
+    places = windows.positions.copy()
+    for when, valid, place in zip(windows.arrived / windows.length, windows.valid, places, strict=True):
+        if valid.any():
+            known = polynomial.polyfit(when[valid], place[valid], min(DEGREE, int(valid.sum()) // SAMPLES))
+            place[valid] = polynomial.polyval(when[valid], known).T
+    return places
