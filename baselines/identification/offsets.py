@@ -26,8 +26,8 @@ WIDER = 2.0
 """Standard deviation of a term over the field's RMS: a wave of 0.6 m has terms so large at ``REACH``."""
 
 DEGREE, SAMPLES = 5, 4
-"""Degree of a polynomial of time through a window's positions, and samples for each, at least. The field is taken there: at noisy
-positions a field that shrinks the workspace would shrink the noise."""
+"""Degree of a polynomial of time through a window's positions, and samples for each, at least. The field is taken there: at
+noisy positions a field that shrinks the workspace would shrink the noise."""
 
 LEAST = 1e-9
 """Pa and m: smaller errors are taken for this."""
