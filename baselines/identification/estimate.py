@@ -81,13 +81,18 @@ class Problem:
             rig, free = self.rig_at(theta), self._start
             if self.slopes is None:
                 self._linearize(rig)
+            least, sizes = np.inf, self.offsets.sizes
             for _ in range(MOST_STEPS):
-                free, residual = settle(self.offsets.corrected(), self.noise, rig, free, self.slopes)
-                before = self.offsets.sizes
-                if self.offsets.step(residual) < STILL:
-                    break
-            self.offsets.sizes = before
-            self._at = theta.tobytes(), free, residual, before
+                tried = settle(self.offsets.corrected(), self.noise, rig, free, self.slopes)
+                cost = float(np.sum(tried[1] ** 2) + np.sum(self.offsets.sizes**2))
+                if cost < least or not np.isfinite(least):
+                    least, sizes, (free, residual) = cost, self.offsets.sizes, tried
+                    if not self.offsets.step(residual) >= STILL:
+                        break
+                else:
+                    self.offsets.sizes = 0.5 * (self.offsets.sizes + sizes)
+            self.offsets.sizes = sizes
+            self._at = theta.tobytes(), free, residual, sizes
         return self._at[1:3]
 
     def residuals(self, theta: Array) -> Array:

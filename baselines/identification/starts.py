@@ -30,7 +30,7 @@ CLOSE = 1e-2
 SHRINKS = 0.5
 """A step longer than this fraction of the one before asks for new slopes."""
 
-MOST_STEPS = 6
+MOST_STEPS = 8
 
 WORSE = 1.15
 """A window whose residuals are so many times the median is begun anew; of 1100 numbers chance makes 1.1."""
