@@ -33,6 +33,7 @@ STUDIES = {
     "gradients-checks": Entry("gradients.checks", "STUDY", "gradients through closed loops beside differences"),
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
     "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
+    "identified": Entry("sensorless.identified", "STUDY", "what a hand feels once a rig is identified from its own log"),
     "installed": Entry("installed", "STUDY", "README's commands, from the wheel alone in an empty home"),
     "leaderboard": Entry("leaderboard", "", "whether entries of leaderboard/ repeat, bit for bit"),
     "learned": Entry("learned.study", "STUDY", "what shipped policies take off controllers' errors"),

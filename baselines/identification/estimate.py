@@ -1,8 +1,9 @@
 """A rig from a trial: the parameters under which the predictions of its windows differ least from what was measured.
 
 The residuals are those of measurements, over their noise, and of the owner's values, over their spreads (``quantities``). Start
-states are eliminated (``starts``), so that SciPy's ``least_squares`` sees the parameters alone. A first search takes short
-windows, and begins at the owner's rig and at the best of many drawn ones; a second one takes all of the trial.
+states (``starts``) and what sensors add (``offsets``) are eliminated, so that SciPy's ``least_squares`` sees the parameters
+alone. A first search takes short windows, and begins at the owner's rig and at the best of many drawn ones; a second one takes
+all of the trial.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from baselines.identification.noise import guessed_noise, noise_from
+from baselines.identification.offsets import Offsets
 from baselines.identification.quantities import QUANTITIES, Quantity, coordinates, limits, rig_at
 from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
@@ -38,6 +40,9 @@ DIFFERENCE = 1e-5
 MOVED, MOST_ROUNDS = 0.05, 3
 """A search is repeated where noise moves by more than this fraction, or the latency by half a period; so many at most."""
 
+STILL, MOST_STEPS = 0.1, 6
+"""Where offsets move by less than so many standard deviations an evaluation ends; steps at most."""
+
 Tick = Callable[[], object]
 
 
@@ -55,7 +60,8 @@ class Problem:
         self.centre, self.limits = coordinates(owner, quantities), limits(owner, quantities)
         self.spread: Array = np.array([one.spread for one in quantities])
         self._start: Array = np.zeros((len(windows.starts), len(FREE)))
-        self._at: tuple[bytes, Array, Array] = (b"", self._start, self._start)
+        self.offsets = Offsets(windows, noise, owner.electronics)
+        self._at: tuple[bytes, Array, Array, Array] = (b"", self._start, self._start, self._start)
         self.slopes: Slopes | None = None
         self.derivatives: Array = np.empty(0)
 
@@ -63,31 +69,52 @@ class Problem:
         """The rig at coordinates (Q,)."""
         return rig_at(self._owner, self.quantities, theta)
 
-    def begin_anew(self, rig: Parameters) -> None:
-        """Begin at the start states that fit a rig best, also where the guess does not lead there."""
-        self._start = begun_anew(self.windows, self.noise, rig, self._start)
+    def begin_anew(self, rig: Parameters, sizes: Array) -> None:
+        """Begin at the start states that fit a rig and offsets of ``sizes`` best, also where the guess does not lead there."""
+        self.offsets.sizes = sizes
+        self._start = begun_anew(self.offsets.corrected(), self.noise, rig, self._start)
 
     def settled(self, theta: Array) -> tuple[Array, Array]:
         """Start states (W, 14) and residuals (W, R + 14) at coordinates (Q,)."""
         if self._at[0] != theta.tobytes():
             self._tick()
-            found = settle(self.windows, self.noise, self.rig_at(theta), self._start, self.slopes)
-            self._at = theta.tobytes(), *found
-        return self._at[1:]
+            rig, free = self.rig_at(theta), self._start
+            if self.slopes is None:
+                self._linearize(rig)
+            least, sizes = np.inf, self.offsets.sizes
+            for _ in range(MOST_STEPS):
+                tried = settle(self.offsets.corrected(), self.noise, rig, free, self.slopes)
+                cost = float(np.sum(tried[1] ** 2) + np.sum(self.offsets.sizes**2))
+                if cost < least or not np.isfinite(least):
+                    least, sizes, (free, residual) = cost, self.offsets.sizes, tried
+                    if not self.offsets.step(residual) >= STILL:
+                        break
+                else:
+                    self.offsets.sizes = 0.5 * (self.offsets.sizes + sizes)
+            self.offsets.sizes = sizes
+            self._at = theta.tobytes(), free, residual, sizes
+        return self._at[1:3]
 
     def residuals(self, theta: Array) -> Array:
-        """All residuals, (W (R + 14) + Q,)."""
-        return np.concatenate([self.settled(theta)[1].ravel(), (theta - self.centre) / self.spread])
+        """All residuals, (W (R + 14) + E + Q,)."""
+        return np.concatenate([self.settled(theta)[1].ravel(), self._at[3], (theta - self.centre) / self.spread])
 
     def jacobian(self, theta: Array) -> Array:
-        """Their derivatives, (W (R + 14) + Q, Q), less what the start states make up for: one lane a parameter and window."""
+        """Their derivatives, (W (R + 14) + E + Q, Q), less what start states and offsets make up for: one lane a parameter and
+        window."""
         self._start, residual = self.settled(theta)
-        self.slopes = slopes_at(self.windows, self.noise, self.rig_at(theta), self._start)
+        slopes = self._linearize(self.rig_at(theta))
         moved = theta + DIFFERENCE * np.eye(len(theta))
         rigs = [self.rig_at(one) for one in moved]
-        found = predicted(self.windows, self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
-        self.derivatives = self.slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
-        return np.concatenate([self.derivatives.reshape(-1, len(theta)), np.diag(1.0 / self.spread)])
+        found = predicted(self.offsets.corrected(), self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
+        own = slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
+        self.derivatives, bent = self.offsets.unexplained(own)
+        return np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
+
+    def _linearize(self, rig: Parameters) -> Slopes:
+        self.slopes = slopes_at(self.windows, self.noise, rig, self._start)
+        self.offsets.linearize(self.slopes)
+        return self.slopes
 
 
 @dataclass(frozen=True)
@@ -145,7 +172,7 @@ def refine(trial: Trial, first: Fit, owner: Parameters, quantities: tuple[Quanti
     for _ in range(MOST_ROUNDS):
         before = found
         problem = Problem(cut(trial, found.rig), found.noise, owner, quantities, tick)
-        problem.begin_anew(found.rig)
+        problem.begin_anew(found.rig, found.problem.offsets.sizes)
         found = search(problem, coordinates(found.rig, quantities), MOST[1])
         if _is_close(before, found, trial.period) and not outliers(problem.settled(found.theta)[1]).any():
             break

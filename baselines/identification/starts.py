@@ -24,13 +24,13 @@ SPREAD = np.array([5e-3, 0.1, 5e-3, 0.1, 2e-4, 2e-4, *[2e4] * 4, *[12.0] * 4])
 DIFFERENCE = 1e-4
 """Step of differences, in ``SPREAD``."""
 
-CLOSE = 3e-3
+CLOSE = 1e-2
 """Where a step moves every window's start by less than this many standard deviations the search ends."""
 
 SHRINKS = 0.5
 """A step longer than this fraction of the one before asks for new slopes."""
 
-MOST_STEPS = 12
+MOST_STEPS = 8
 
 WORSE = 1.15
 """A window whose residuals are so many times the median is begun anew; of 1100 numbers chance makes 1.1."""

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.statistics import quantile
-from baselines.identification.quantities import QUANTITIES
+from baselines.identification.quantities import QUANTITIES, value_of
 from baselines.work.tasks import Task
-from birthsim_env.physics.rig.parameters import field_of
+from birthsim_env.parts.drawn.randomization import Ranges
+from birthsim_env.physics.rig.parameters import Parameters, field_of
 from studies.recovery.tasks import EXPERIMENTS, RANGES, recovery_tasks
 from studies.results import Content
 from studies.study import Found, Options, Study
@@ -36,7 +37,7 @@ def _shown(content: Content, name: str) -> dict[str, str]:
     return {f"{name}.md": "\n".join([head, "", *recovery_table(found), "", last]) + "\n"}
 
 
-def recovery_table(results: list[dict[str, Any]]) -> list[str]:
+def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> list[str]:
     """Markdown: per parameter how many rigs' logs tell it, and of these error and interval."""
     lines = [
         "| parameter | randomised from | told in | error: median | 95th percentile | largest | half interval: median "
@@ -46,15 +47,15 @@ def recovery_table(results: list[dict[str, Any]]) -> list[str]:
     for one in QUANTITIES:
         rows = [result["rows"][one.name] for result in results]
         told = [row for row in rows if row["told"]]
-        low, high = RANGES[one.name]
+        low, high = ranges.get(one.name, 2 * [value_of(Parameters(), one.name)])
         scale, unit, digits = (1e3, "ms", 2) if one.unit else (100.0, "%", 2)
         errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.unit else row["true"]) for row in told]
         halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.unit else row["true"]) for row in told]
         cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
         inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
         written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)
-        ranges = f"{low:g} to {high:g} {field_of(one.name).metadata['unit']}"
-        lines.append(f"| `{one.name}` | {ranges} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
+        drawn = f"{low:g} to {high:g} {field_of(one.name).metadata['unit']}"
+        lines.append(f"| `{one.name}` | {drawn} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
     return lines
 
 

@@ -1,5 +1,6 @@
 """A rig without a force sensor, with and without an acceleration sensor, beside a rig that has a force sensor."""
 
+from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
@@ -11,7 +12,6 @@ from baselines.work.tasks import Task
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
-from studies.results import Content
 from studies.sensorless.measures import measure
 from studies.sensorless.rigs import OFF, PLANTS, believed
 from studies.study import Found, Options, Study
@@ -45,14 +45,19 @@ def _tasks(options: Options) -> dict[Any, Task]:
                 "sensors": "honest", "force_sensor": rig == "force", "seed": first,
                 "lanes": min(LANES[plant], options.seed + options.episodes - first),
             }  # fmt: skip
-            stem = f"{rig.replace(', ', '-').replace(' ', '-')}/{plant}-{first}"
-            found[rig, plant, first] = Task(stem, measure, {**own, **more})
+            found[rig, plant, first] = Task(f"{stem_of(rig)}/{plant}-{first}", measure, {**own, **more})
     return found
 
 
-def _kept(options: Options, found: Found) -> Any:
+def stem_of(rig: str) -> str:
+    """One of ``RIGS`` in a file's name."""
+    return rig.replace(", ", "-").replace(" ", "-")
+
+
+def kept(plants: Iterable[str], found: Found) -> Any:
+    """A row for each of ``RIGS`` and each plant: medians, 95th percentiles and the worst."""
     rows = []
-    for rig, plant in product(RIGS, options.plant):
+    for rig, plant in product(RIGS, plants):
         pieces = [result for key, result in found.items() if key[:2] == (rig, plant)]
         values = {name: np.concatenate([piece[name] for piece in pieces]) for name in (*COLUMNS, *SCENARIOS, "lost")}
         figures = {name: [quantile(values[name], share) for share in (0.5, 0.95, 1.0)] for name in (*COLUMNS, *SCENARIOS)}
@@ -61,20 +66,23 @@ def _kept(options: Options, found: Found) -> Any:
     return jsonable(rows)
 
 
-def _shown(content: Content) -> dict[str, str]:
-    words, tables = {"known": f"known to {100 * OFF:g} %"}, []
+def tables(figures: Any) -> str:
+    """What a hand feels, and errors by scenario."""
+    words, found = {"known": f"known to {100 * OFF:g} %"}, []
     for names, titles in ((COLUMNS, list(COLUMNS.values())), (SCENARIOS, [f"{name}: settled error, mm" for name in SCENARIOS])):
         rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
-        for row in content["figures"]:
+        for row in figures:
             shown = [cells(row["figures"][name][:2]) for name in names]
             rows.append([row["rig"], words.get(row["plant"], row["plant"]), *shown, f"{row['lost']} of {row['of']}"])
-        tables.append(markdown(rows))
-    return {"sensorless.md": "\n\n".join(tables) + "\n"}
+        found.append(markdown(rows))
+    return "\n\n".join(found) + "\n"
 
 
 STUDY = Study(
-    ("studies.sensorless.measures",), {"plant": PLANTS, "episodes": 128, "seed": 330000}, _tasks, _kept,
+    ("studies.sensorless.measures",), {"plant": PLANTS, "episodes": 128, "seed": 330000}, _tasks,
+    lambda options, found: kept(options.plant, found),
     {"stiffness_error": "%", "hunting": "mm", "clamped_mm": "mm", "clamped_N": "N", "overshoot": "mm",
      **dict.fromkeys(SCENARIOS, "mm"), "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
-    _shown, allowed={"plant": PLANTS}, words={"plant": "what the controller knows of the rig"},
+    lambda content: {"sensorless.md": tables(content["figures"])}, allowed={"plant": PLANTS},
+    words={"plant": "what the controller knows of the rig"},
 )  # fmt: skip

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.identification import starts
+from baselines.identification import estimate, starts
 from baselines.identification.certainty import certainty_of
 from baselines.identification.estimate import Problem, fit, refine, search
 from baselines.identification.identified import identify
@@ -44,9 +44,12 @@ def problem(noise: Noise | None = None) -> Problem:
 
 
 def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """J'r against central differences of the cost, whose start states are sought anew at every place."""
+    """J'r against central differences of the cost, whose start states and offsets are sought anew at every place."""
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
+    monkeypatch.setattr(estimate, "STILL", 1e-5)
     asked, theta = problem(), coordinates(TRUE, QUANTITIES)
+    asked.jacobian(theta)  # whose slopes are those of where the start states end
+    asked.residuals(theta + 1e-9)
     gradient = asked.jacobian(theta).T @ asked.residuals(theta)
     size = np.linalg.norm(asked.jacobian(theta), axis=0)
     for k in range(len(theta)):

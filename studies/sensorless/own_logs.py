@@ -1,0 +1,67 @@
+"""Drawn worlds, what ``birthsim identify`` finds in a log of each, and what a hand feels of laws that are told it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from baselines.backstepping.controller import BacksteppingController
+from baselines.identification.experiment import propose
+from baselines.identification.identified import identify
+from baselines.identification.laboratory import run_plan
+from baselines.identification.quantities import value_of
+from baselines.registry import make_controller
+from baselines.staged import StagedController
+from baselines.work.tasks import Result
+from birthsim_env.physics.rig.parameters import Parameters
+from studies.comparison.grid import as_described
+from studies.haptics.worlds import Condition
+from studies.sensorless.measures import PULLS, _clamped, _episodes, _pulled
+from studies.sensorless.told import Told
+from studies.shaken import shaken
+
+SENSORS = "honest"
+
+
+@dataclass(frozen=True)
+class Informed(Condition):
+    """Drawn rigs under a law that is ``told`` a rig for each."""
+
+    told: Sequence[Parameters] = ()
+
+    def law(self) -> Told:
+        return Told([cast(StagedController, make_controller(self.controller, rig)) for rig in self.told])
+
+
+def identified(duration: float, seed: int) -> Result:
+    """The rig that a log of world ``seed`` tells, and of each quantity its true value, that of the rig, and the interval.
+
+    The law of the experiment and the identification begin at the default rig; nobody touches the head.
+    """
+    owner = as_described(Parameters())
+    true = Condition("", owner, SENSORS, seed, 1, False).drawn()
+    trial = run_plan(propose(owner, duration, seed), true, BacksteppingController(owner), SENSORS, seed)[0]
+    found = identify(trial, owner, seed)
+    rows = {
+        row.name: {
+            "true": value_of(true[0], row.name), "value": row.value, "low": row.low, "high": row.high, "told": row.determined,
+        } for row in found.rows
+    }  # fmt: skip
+    return {"rig": found.rig.to_dict(), "rows": rows, "misfit": list(found.misfit)}
+
+
+def measure(
+    controller: str, source: str, rig: dict[str, Any], told: list[dict[str, Any]], force_sensor: bool, seed: int
+) -> Result:  # fmt: skip
+    """``measures.measure`` of as many worlds as rigs are ``told``; of the sensors a controller believes what ``rig`` says."""
+    owner = Parameters.from_dict(rig)
+    board = {"electronics.acceleration_bandwidth": owner.electronics.acceleration_bandwidth}
+    rigs = [Parameters.from_dict(one).replace(board) for one in told]
+    condition = Informed(controller, owner, SENSORS, seed, len(rigs), force_sensor, rigs)
+    found = {**_episodes(condition, len(rigs)), **_clamped(condition)}
+    found["noticed"] = shaken(condition.law(), condition.drawn(), SENSORS, seed, force_sensor)["noticed"]
+    pulled = [_pulled(condition, pull) for pull in PULLS]
+    found["overshoot"] = np.concatenate([one["overshoot"] for one in pulled])
+    found["lost"] = np.concatenate([found["lost"], *(one["lost"] for one in pulled)])
+    return {name: np.asarray(values, dtype=np.float64).tolist() for name, values in found.items()}
