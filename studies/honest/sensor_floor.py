@@ -6,11 +6,14 @@ switched off, and so is the bias of the force, which a law may tare.
 """
 
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
 import numpy as np
 
+from baselines.estimation.admittance import DAMPING_RATIO
+from baselines.impedance import DeclaredMotion, mass_spring_damper
 from birthsim_env.loop.signals import displacement
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.drawn.seeding import stream
@@ -46,7 +49,7 @@ def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
     static = _static_sensors(rig, episodes, seed)
 
     def place(pushed: Array) -> Array:
-        return _place(static, target, stiffness, pushed)
+        return _place(static, target + _spring(_felt(static, pushed), stiffness))
 
     moved, wanted = place(force) - place(np.zeros_like(force)), _spring(force, stiffness)
     direction = force / np.hypot(*force)
@@ -70,20 +73,49 @@ def circle_floor(rig: Parameters, episodes: int, seed: int) -> Array:
         force = forces_of(hand, np.full((1, episodes), instant), reference.position, reference.velocity)[0].copy()
         jumped[np.any(force != before, axis=0)] = instant
         before, settled = force, instant - jumped >= SETTLED
-        missed = _place(static, reference.position, reference.stiffness, force) - reference.compliant_target(force)
+        asked = reference.position + _spring(_felt(static, force), reference.stiffness)
+        missed = _place(static, asked) - reference.compliant_target(force)
         squares += settled * (missed**2).sum(axis=0)
         counts += settled
     env.close()
     return np.asarray(1e3 * np.sqrt(squares / counts))
 
 
-def _place(static: HonestSensors, target: Array, stiffness: Array, force: Array) -> Array:
-    """Where (2, N), m, the place shown is the one that the force shown asks for."""
-    found: Array = target + _spring(force, stiffness)
+def motion_floor(env: Any, rig: Parameters, seed: int) -> Array:
+    """RMS, mm, (N,), from ``SETTLED`` s on, of how far a place shown is wrong that follows the impedance of ``admittance``.
+
+    The impedance moves under the force shown; the error compares with its motion under the true force. ``env`` is a residual
+    vector environment for ``rig`` with ``honest`` sensors, whose controller, under actions of zero, the hand holds.
+    """
+    lanes, still = env.num_envs, np.zeros(env.action_space.shape, np.float32)
+    env.reset(seed=seed)
+    simulation, static = env.simulation, _static_sensors(rig, lanes, seed)
+    period, reference, force = simulation.period * simulation.periods, simulation.reference, simulation.force.copy()
+    true, shown, squares, counts = DeclaredMotion(lanes), DeclaredMotion(lanes), np.zeros(lanes), 0
+    # Where an episode has ended the next has begun.
+    for step in range(env.steps - 1):
+        impedance, before = mass_spring_damper(reference, simulation.parameters.mechanics.mass, DAMPING_RATIO), force
+        env.step(still)
+        reference, force = simulation.reference, simulation.force.copy()
+        true.advance(impedance, before, force, period)
+        shown.advance(impedance, _felt(static, before), _felt(static, force), period)
+        if step * period >= SETTLED:
+            missed = _place(static, reference.position + shown.offset[:2]) - reference.position - true.offset[:2]
+            squares, counts = squares + (missed**2).sum(axis=0), counts + 1
+    return np.asarray(1e3 * np.sqrt(squares / counts))
+
+
+def _place(static: HonestSensors, asked: Array) -> Array:
+    """The place (2, N), m, that is shown as ``asked`` (2, N)."""
+    found, none = asked, np.zeros_like(asked)
     for _ in range(STEPS):
-        shown, felt = _shown(static, found, force)
-        found = found - (shown - target - _spring(felt, stiffness))
+        found = found - (_shown(static, found, none)[0] - asked)
     return found
+
+
+def _felt(static: HonestSensors, force: Array) -> Array:
+    """What a force (2, N), N, is shown as."""
+    return _shown(static, np.zeros_like(force), force)[1].copy()
 
 
 def _spring(force: Array, stiffness: Array) -> Array:
@@ -92,13 +124,19 @@ def _spring(force: Array, stiffness: Array) -> Array:
     return np.stack([x, y])
 
 
+def static_only(rig: Parameters) -> Parameters:
+    """``rig`` whose sensors have no errors but ``STATIC``, which are drawn as those of ``rig``."""
+    others = {f"electronics.{name}": 0.0 for name in FIGURES if name not in STATIC}
+    ranges = {name: (low, high) for name, low, high in rig.ranges} | {name: (0.0, 0.0) for name in others}
+    return replace(rig.replace(others), ranges=tuple((name, *pair) for name, pair in ranges.items()))
+
+
 def _static_sensors(rig: Parameters, episodes: int, seed: int) -> HonestSensors:
     """The sensors of these worlds with nothing but ``STATIC``."""
-    others = [name for name in FIGURES if name not in STATIC]
-    sensors = HonestSensors(rig.replace({f"electronics.{name}": 0.0 for name in others}).electronics, episodes)
-    drawn = {name: pair for name, pair in documented_ranges(rig, "honest").items() if name in HonestSensors.drawn}
+    still = static_only(rig)
+    sensors, drawn = HonestSensors(still.electronics, episodes), documented_ranges(still, "honest")
     # A figure that is switched off still takes its number from the stream.
-    sensors.vary({name: pair if name.rpartition(".")[2] in STATIC else (0.0, 0.0) for name, pair in drawn.items()})
+    sensors.vary({name: pair for name, pair in drawn.items() if name in HonestSensors.drawn})
     for lane in range(episodes):
         sensors.begin(lane, stream(seed + lane, 0, "sensors"))
     return sensors

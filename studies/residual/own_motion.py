@@ -1,4 +1,7 @@
-"""How far policies and their controller are from the motion that the controller's own impedance asks for, as hands move."""
+"""How far policies and their controller are from the motion that the controller's own impedance asks for, as hands move.
+
+Beside them stand the controller without the errors of its sensors that change in an episode, and what the others leave to any.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -11,11 +14,12 @@ from agents.policy.files import WEIGHTS, load_policy
 from agents.policy.seeds import policy_folders
 from agents.training.configuration import TARGETS
 from agents.training.validation import validate
-from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
+from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
 from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from studies.honest.sensor_floor import motion_floor, static_only
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.tables import markdown
@@ -26,20 +30,27 @@ PARTS = (0.5, 0.95, 1.0)
 
 STATIC = "BirthSIM/Probe-v2"
 
+STEADY, FLOOR = BOUNDS = ("its sensors without noise, delays and bias", "no controller has less")
+"""The controller where sensors err by scale, distortion, gain and crosstalk alone; and what those leave to any controller."""
+
 
 def own_motion(
-    policy: str, seed_name: str, network: str, hand: str, sensors: str, rig: dict[str, Any], seed: int, episodes: int
+    policy: str, who: str, network: str, hand: str, sensors: str, rig: dict[str, Any], seed: int, episodes: int
 ) -> Result:
-    """Per world, the distance from the declared motion, mm, of a policy, or without a ``seed_name`` of its controller."""
-    one = load_policy(Path(policy))
+    """Per world, the distance from the declared motion, mm, of a policy, of its controller or of one of ``BOUNDS``."""
+    one, believed = load_policy(Path(policy)), Parameters.from_dict(rig)
     env: Any = gymnasium.make_vec(
-        one.environment, num_envs=episodes, sensors=sensors, parameters=Parameters.from_dict(rig), randomize=True,
-        user_force=hand, **one.settings.to_dict(),
+        one.environment, num_envs=episodes, sensors=sensors, randomize=True, user_force=hand,
+        parameters=static_only(believed) if who == STEADY else believed, **one.settings.to_dict(),
     )  # fmt: skip
-    zero = np.zeros((episodes, one.settings.size), np.float32)
-    score = validate(env, one.network.acting() if seed_name else lambda seen: zero, seed, TARGETS[1])
+    if who == FLOOR:
+        found = {"error": motion_floor(env, believed, seed).tolist(), "lost": 0}
+    else:
+        zero = np.zeros((episodes, one.settings.size), np.float32)
+        score = validate(env, (lambda seen: zero) if who in ("", STEADY) else one.network.acting(), seed, TARGETS[1])
+        found = {"error": score.error.tolist(), "within": score.feasible.tolist(), "lost": score.lost}
     env.close()
-    return {"error": score.error.tolist(), "within": score.feasible.tolist(), "lost": score.lost}
+    return found
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -47,14 +58,17 @@ def _tasks(options: Options) -> dict[Any, Task]:
     world = {"sensors": options.sensors, "randomize": True}
     folders = policy_folders(options.policy)
     law = load_policy(folders[0]).settings.law
-    for name, place in (("", folders[0]), *((one.name, one) for one in folders)):
+    bounds = BOUNDS if options.sensors == "honest" else ()
+    for name, place in (*((name, folders[0]) for name in ("", *bounds)), *((one.name, one) for one in folders)):
         network = file_hash(str(place / WEIGHTS))
         for hand in HANDS:
             settings = {
-                "policy": str(place), "seed_name": name, "network": network, "hand": hand, "sensors": options.sensors,
+                "policy": str(place), "who": name, "network": network, "hand": hand, "sensors": options.sensors,
                 "rig": rig.to_dict(), "seed": options.seed, "episodes": options.episodes,
             }  # fmt: skip
-            tasks[hand, name] = Task(f"{hand}-{name}", own_motion, settings)
+            tasks[hand, name] = Task(f"{hand}-{file_stem(name)}", own_motion, settings)
+        if name in bounds:
+            continue
         own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
         pushed, work = (own, evaluate_learned) if name else (controller_settings(law, rig), None)
         pieces = evaluation_tasks(f"pushed-{name}", pushed, STATIC, world, options.episodes, options.seed, work)
@@ -65,19 +79,21 @@ def _tasks(options: Options) -> dict[Any, Task]:
 def _kept(options: Options, found: Found) -> Any:
     law = load_policy(policy_folders(options.policy)[0]).settings.law
     names = list(dict.fromkeys(name for hand, name, *_ in found if hand == HANDS[0]))
+    bounds, seeds = [name for name in names if name in BOUNDS], [name for name in names if name not in ("", *BOUNDS)]
+    groups = {law: [""], f"{options.policy}, {len(seeds)} seeds": seeds, **{name: [name] for name in bounds}}
     rows = []
     for hand in HANDS:
         within = np.array(found[hand, ""]["within"])
         errors = {name: np.array(found[hand, name]["error"])[within] for name in names}
-        less = np.stack([errors[""] - errors[name] for name in names if name])
-        for who, own in ((law, errors[""][None]), (f"{options.policy}, {len(less)} seeds", errors[""] - less)):
+        for who, own in groups.items():
+            less = errors[""] - np.stack([errors[name] for name in own])
             rows.append({
-                "hand": hand, "who": who, "error": [quantile(own, part) for part in PARTS], "within": int(within.sum()),
-                "less": None if who == law else [_mean(less), *crossed_interval(_mean, less)],
-                "lost": sum(found[hand, name]["lost"] for name in names if bool(name) == (who != law)),
+                "hand": hand, "who": who, "error": [quantile(errors[""] - less, part) for part in PARTS],
+                "within": int(within.sum()), "less": None if who == law else [_mean(less), *crossed_interval(_mean, less)],
+                "lost": sum(found[hand, name]["lost"] for name in own),
             })  # fmt: skip
     static = {}
-    for name in names:
+    for name in ("", *seeds):
         pieces = [result for (what, who, *_), result in found.items() if (what, who) == (STATIC, name)]
         sizes = np.abs(gathered(name, pieces).metrics["stiffness_error"])
         static[name or law] = [quantile(sizes, part) for part in PARTS]
@@ -100,12 +116,8 @@ def _shown(content: Content) -> dict[str, str]:
         f"{settings['episodes']} circles from seed {settings['seed']}, `{settings['sensors']}` sensors, randomised rigs, those "
         f"within the rig's strength. Differences compare the same worlds, with 95 % intervals. Below: `{STATIC}`."
     )
-    return {
-        "own-motion.md": "\n\n".join(
-            [head, markdown(rows, rows[0][2:3], alike=[row[0] for row in rows[1:]]), markdown(static, static[0])]
-        )
-        + "\n"
-    }
+    moving = markdown(rows, rows[0][2:3], alike=[(hand, who in BOUNDS) for hand, who, *_ in rows[1:]])
+    return {"own-motion.md": "\n\n".join([head, moving, markdown(static, static[0])]) + "\n"}
 
 
 STUDY = Study(

@@ -12,7 +12,7 @@ from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.comparison.grid import as_described
-from studies.honest.sensor_floor import circle_floor, probe_floor
+from studies.honest.sensor_floor import circle_floor, motion_floor, probe_floor
 from tests.oracles import closed_loop
 
 RIG = Parameters()
@@ -70,6 +70,15 @@ def test_sensors_as_described_are_the_same_in_all_worlds():
     assert drawn["mechanics.mass"] == documented_ranges(Parameters(), "honest")["mechanics.mass"]
 
 
+def moving(rig, lanes):
+    """``motion_floor`` (lanes,), mm, of the worlds of ``circle_floor``."""
+    world = {"parameters": rig, "sensors": "honest", "randomize": True}
+    env = gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=lanes, **world)
+    found = motion_floor(env, rig, 0)
+    env.close()
+    return found
+
+
 @pytest.mark.slow
 def test_on_circles_a_scale_and_a_gain_leave_their_share():
     """Scale s: the distance from the registration times s/(1 + s); gain g: g times the displacement asked for; else nothing."""
@@ -77,6 +86,8 @@ def test_on_circles_a_scale_and_a_gain_leave_their_share():
     scaled = circle_floor(exact(position_scale_error=0.01), 16, 0)
     assert scaled.min() > 0.0
     assert scaled.max() < 0.012 * 400.0, "places are within 400 mm of the registration"
+    assert moving(exact(), 4).max() < 1e-9
+    assert moving(exact(position_scale_error=0.01), 16) == pytest.approx(scaled, rel=0.1), "a mass moves it by millimetres"
     gained = circle_floor(exact(force_gain_error=0.01), 16, 0)
     assert 0.0 < gained.max() < 0.03 * 1e3 * 40.0 / 500.0, "40 N at 500 N/m, 1 % drawn up to threefold"
 
