@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from baselines import about
 from baselines.backstepping.impedance import joint_impedance
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
 from baselines.registry import LISTED, UNCONTROLLED, make_controller
@@ -60,13 +61,9 @@ def test_a_coupled_stiffness_is_felt_along_the_push():
     np.testing.assert_allclose(declared.damping[..., 0] @ declared.damping[..., 0], (1.8**2) * 3.0 * k, rtol=1e-12)
 
 
-USES = {"backstepping": False, "backstepping-cartesian": False, "admittance-sensorless": False}
-USES |= {"admittance-backstepping": True, "admittance-adaptive": True, "pid": True}
-
-
-@pytest.mark.parametrize("name", USES)
-def test_who_uses_the_force_of_the_hand(name):
-    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is USES[name]
+@pytest.mark.parametrize("name", sorted(set(LISTED)))
+def test_who_is_said_to_use_the_force_of_the_hand_does(name):
+    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is about.uses_force(name)
     assert not uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=False))
 
 
