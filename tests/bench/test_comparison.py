@@ -1,4 +1,4 @@
-"""The comparison: settings, lost episodes and ratios in figures, tables and pictures; stored tables are its golden files."""
+"""The comparison: settings, lost episodes and ratios in its figures, tables and pictures; stored tables pin the rest."""
 
 import math
 

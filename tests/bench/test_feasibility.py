@@ -34,19 +34,6 @@ def made(lanes=1, **arguments):
     return env
 
 
-def strengths(rig):
-    """Largest push and pull of the air, N, (2 cylinders, 2): full against empty chambers, the atmosphere on the rod."""
-    air = rig.air
-    most = []
-    for cylinder in (rig.cylinder1, rig.cylinder2):
-        ap, an = derived.areas(cylinder)
-        rod = air.atmospheric_pressure * (ap - an)
-        push = air.supply_pressure * ap - air.atmospheric_pressure * an - rod
-        pull = air.supply_pressure * an - air.atmospheric_pressure * ap + rod
-        most.append((push, pull))
-    return np.array(most)
-
-
 def columns_at(place, rig=RIG):
     """Velocity of the end effector at ``place`` (2,) per unit speed of each piston: (2 axes, 2 cylinders)."""
     r4, r2 = by_points.lengths(by_points.pose_from_point(place[:, None], rig.geometry))
@@ -55,8 +42,13 @@ def columns_at(place, rig=RIG):
 
 
 def fraction(needed, rig=RIG):
-    """The larger fraction of both cylinders for the forces ``needed`` (2,), N."""
-    return float(max(max(n / push, -n / pull) for n, (push, pull) in zip(needed, strengths(rig), strict=True)))
+    """The larger fraction of both cylinders' strength, full against empty chambers, for the forces ``needed`` (2,), N."""
+    full, empty, found = rig.air.supply_pressure, rig.air.atmospheric_pressure, []
+    for force, cylinder in zip(needed, (rig.cylinder1, rig.cylinder2), strict=True):
+        ap, an = derived.areas(cylinder)
+        rod = empty * (ap - an)
+        found.append(max(force / (full * ap - empty * an - rod), -force / (full * an - empty * ap + rod)))
+    return max(found)
 
 
 def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_its_force():

@@ -68,35 +68,27 @@ def test_errors_whole_and_settled_are_rms_and_largest_size_in_millimetres():
     assert (never["error_rms_x"], never["error_max_y"]) == (pytest.approx(2), pytest.approx(1))
 
 
-def test_pneumatic_stiffness_error_is_relative_to_its_setpoint():
-    stiffness = over_time([[4400, 2000], [3600, 1900], [4000, 2000], [4000, 2000]])
-    result = measure(4, pneumatic_stiffness=stiffness)
-    assert result["pneumatic_rms_1"] == pytest.approx(100 * math.sqrt(2 * 0.01 / 4))
-    assert result["pneumatic_rms_2"] == pytest.approx(100 * math.sqrt(0.0025 / 4))
+SATURATED, TURNING = np.zeros((8, 4, 1)), np.zeros((6, 4, 1))
+SATURATED[0, 3], SATURATED[1, 0], SATURATED[2, 1:3], SATURATED[3] = 1.0, -1.0, 1.0, 0.9999
+TURNING[:, 0, 0] = [0.5, 0.7, 0.7, 0.6, 0.6, 0.9]  # up, still, down, still, up: turns twice, travels 0.6
+TURNING[:, 1, 0] = [0, -1, 0, -1, 0, -1]  # turns four times, travels 5
+STIFFNESS = over_time([[4400, 2000], [3600, 1900], [4000, 2000], [4000, 2000]])
+LITRES = 0.5 * 1e-3 / NORMAL_DENSITY * 1000 * 60
+"""Normal litres per minute of one gram per second for half of the time."""
+KNOWN = {
+    "to its setpoint": ({"pneumatic_stiffness": STIFFNESS}, {"pneumatic_rms_1": math.sqrt(50), "pneumatic_rms_2": 2.5}),
+    **{f"period {period}": ({"period": period, "supply_flow": np.repeat([[1e-3], [0.0]], 250, axis=0)}, {"air": LITRES})
+       for period in (0.001, 0.004)},
+    "any valve at its limit": ({"command": SATURATED}, {"saturation": 100 * 3 / 8}),
+    "the mean valve": ({"command": TURNING, "period": 0.01}, {"valve_turns": 6 / 4 / 0.06, "valve_travel": 5.6 / 4 / 0.06}),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("period", [0.001, 0.004])
-def test_air_is_in_normal_litres_per_minute_whatever_the_period(period):
-    # One gram per second for half of the time.
-    flow = np.where(np.arange(500) < 250, 1e-3, 0.0)[:, None]
-    expected = 0.5 * 1e-3 / NORMAL_DENSITY * 1000 * 60
-    assert measure(500, period=period, supply_flow=flow)["air"] == pytest.approx(expected)
-    assert expected == pytest.approx(23.2, abs=0.05)
-
-
-def test_saturation_is_the_fraction_of_time_with_any_valve_at_its_limit():
-    command = np.zeros((8, 4, 1))
-    command[0, 3], command[1, 0], command[2, 1:3], command[3] = 1.0, -1.0, 1.0, 0.9999
-    assert measure(8, command=command)["saturation"] == pytest.approx(100 * 3 / 8)
-
-
-def test_valve_turns_and_travel_are_those_of_the_mean_valve():
-    command = np.zeros((6, 4, 1))
-    command[:, 0, 0] = [0.5, 0.7, 0.7, 0.6, 0.6, 0.9]  # up, still, down, still, up: turns twice, travels 0.6
-    command[:, 1, 0] = [0, -1, 0, -1, 0, -1]  # turns four times, travels 5
-    found = measure(6, period=0.01, command=command)
-    assert found["valve_turns"] == pytest.approx((2 + 4) / 4 / 0.06)
-    assert found["valve_travel"] == pytest.approx((0.6 + 5) / 4 / 0.06)
+@pytest.mark.parametrize(("signals", "expected"), KNOWN.values(), ids=KNOWN)
+def test_stiffness_air_and_valves_have_the_figures_that_follow_by_hand(signals, expected):
+    found = measure(max(len(one) for one in signals.values() if np.ndim(one)), **signals)
+    assert {name: found[name] for name in expected} == {name: pytest.approx(value) for name, value in expected.items()}
+    assert pytest.approx(23.2, abs=0.05) == LITRES
 
 
 def test_a_lane_that_is_not_alive_is_left_as_it_is():

@@ -114,34 +114,18 @@ def test_the_setpoint_lies_inside_both_ranges():
 
 
 def test_pictures_show_medians_and_ranges_and_name_what_is_lost(drawn, tmp_path):
-    good = {
-        "setpoints": [1000.0, 4000.0],
-        "error_percent": [[1.0, 2.0, 9.0], [3.0, None, 5.0]],
-        "hunting_mm": [[1e-9, 2.0], [4.0, 3.0]],
-    }
+    good = {"setpoints": [1e3, 4e3], "error_percent": [[1, 2, 9], [3, None, 5]], "hunting_mm": [[1e-9, 2], [4, 3]]}
     bad = {**good, "error_percent": [[None] * 3] * 2, "hunting_mm": [[None] * 2] * 2}
-    polar = {
-        "angles": [0.0, 2.0, 4.0],
-        "setpoint": 2000.0,
-        "stiffness": [[2000.0, 2200.0, 1900.0]] * 2 + [[1500.0, None, 1500.0]],
+    polar = {"angles": [0, 2, 4], "setpoint": 2000, "stiffness": [[2000, 2200, 1900]] * 2 + [[1500, None, 1500]]}
+    ellipse = {"poses": [[0.4, 0], [0.5, 0]], "setpoint": [[2000, 0], [0, 2000]], "stiffness": [[[2200, 0], [0, 2000]], None]}
+    push = {"amplitudes": [2, 40], "error_percent": [[100, 300, 200], [5, 7, 6]]}
+    figures = {
+        "stiffness": {"good": good, "bad": bad},
+        "polar": {"good": polar, "bad": {**polar, "stiffness": [[None] * 3] * 3}},
+        "ellipses": {"good": ellipse, "bad": {**ellipse, "stiffness": [None, None]}},
+        "disturbance": {f"{name}, {rig}": push for name in ("law", "more") for rig in ("with friction", "frictionless")},
     }
-    gone = {**polar, "stiffness": [[None] * 3] * 3}
-    ellipse = {"poses": [[0.4, 0.0], [0.5, 0.0]], "setpoint": [[2000.0, 0.0], [0.0, 2000.0]]}
-    push = {"amplitudes": [2.0, 40.0], "error_percent": [[100.0, 300.0, 200.0], [5.0, 7.0, 6.0]]}
-    study_figures.draw_studies(
-        {
-            "stiffness": {"good": good, "bad": bad},
-            "polar": {"good": polar, "bad": gone},
-            "ellipses": {
-                "good": {**ellipse, "stiffness": [[[2200.0, 0.0], [0.0, 2000.0]], None]},
-                "bad": {**ellipse, "stiffness": [None, None]},
-            },
-            "disturbance": {
-                f"{name}, {label}": push for name in ("law", "more") for label in ("with friction", "frictionless")
-            },
-        },
-        tmp_path,
-    )
+    study_figures.draw_studies(figures, tmp_path)
     stiffness = drawn["rendered_stiffness"]
     assert [t.get_text() for t in stiffness.legends[0].get_texts()] == ["good (1 of 6 lost)", "bad (6 of 6 lost)"]
     np.testing.assert_allclose(stiffness.axes[0].lines[0].get_ydata(), [2.0, 4.0])

@@ -1,11 +1,9 @@
 """The hand-written C of the plant computes what the kernel computes, but for rounding."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-import birthsim_env
+from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled.lanes import HALF_L1, HALF_L2, V1, V2, Y1, Y2
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from studies.speed.twin import PLAIN, Twin, has_compiler
@@ -24,23 +22,15 @@ def twin(tmp_path_factory):
     return Twin(tmp_path_factory.mktemp("twin"), PLAIN)
 
 
-def drawn_rigs(law, rng):
-    rig = birthsim_env.Parameters()
-    return [
-        replace(
-            rig,
-            friction=replace(rig.friction, law=law, static_ratio=rng.uniform(1.0, 2.0)),
-            mechanics=replace(rig.mechanics, mass=rng.uniform(0.5, 1.5) * rig.mechanics.mass),
-            valves=replace(rig.valves, critical_ratio=rng.uniform(0.2, 0.5)),
-        )
-        for _ in range(LANES)
-    ]
-
-
 @pytest.mark.parametrize("law", ["lugre", "elasto_plastic", "coulomb"])
 def test_the_twin_is_the_plant_but_for_rounding(twin, law):
     rng = np.random.default_rng(7)
-    plant = birthsim_env.Plant(drawn_rigs(law, rng), LANES)
+    rigs = []
+    for _ in range(LANES):
+        drawn = {"friction.static_ratio": (1.0, 2.0), "mechanics.mass": (1.5, 4.5), "valves.critical_ratio": (0.2, 0.5)}
+        figures = {name: rng.uniform(*ends) for name, ends in drawn.items()}
+        rigs.append(Parameters().replace({"friction.law": law, **figures}))
+    plant = Plant(rigs, LANES)
     side = rng.choice([-1.0, 1.0], (2, LANES))
     plant.state[[Y1, Y2]] = side * rng.uniform(0.8, 1.0, (2, LANES)) * plant.lane_parameters[[HALF_L1, HALF_L2]]
     plant.state[[V1, V2]] = side * rng.uniform(0.0, 0.5, (2, LANES))

@@ -69,19 +69,6 @@ class Fails(Slam):
 """
 
 
-@pytest.fixture
-def small_studies(monkeypatch):
-    """Studies of one pose, which take a second each instead of ten."""
-    pose = ((0.5, 0.0),)
-    for name, options in (
-        ("stiffness", {"setpoints": (2000.0,), "poses": pose, "forces": (20.0,)}),
-        ("polar", {"directions": 4, "poses": pose}),
-        ("ellipses", {"poses": pose}),
-    ):
-        monkeypatch.setitem(studies.STUDIES, name, partial(studies.STUDIES[name], **options))
-    monkeypatch.setattr(studies, "disturbance_study", partial(studies.disturbance_study, amplitudes=(2.0, 20.0), poses=pose))
-
-
 @pytest.mark.slow
 def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
@@ -111,7 +98,12 @@ def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_how_the_stiffness_feels_is_kept_and_drawn(tmp_path, monkeypatch, capsys, small_studies):
+def test_how_the_stiffness_feels_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
+    """Studies of one pose, which take a second each instead of ten."""
+    pose, small = {"poses": ((0.5, 0.0),)}, {"setpoints": (2000.0,), "forces": (20.0,)}
+    for name, options in (("stiffness", small), ("polar", {"directions": 4}), ("ellipses", {})):
+        monkeypatch.setitem(studies.STUDIES, name, partial(studies.STUDIES[name], **pose, **options))
+    monkeypatch.setattr(studies, "disturbance_study", partial(studies.disturbance_study, amplitudes=(2.0, 20.0), **pose))
     (tmp_path / "slam.py").write_text(OWN)
     slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
     status, printed, complained = call("stiffness", monkeypatch, capsys, "--controller", "backstepping", slam, "--out", out)

@@ -189,6 +189,7 @@ def test_another_environment_goes_on_from_a_state_over_ends_of_episodes(world):
     one, other = made(world, 3), made(world, 3)
     given = random_actions(one, 60)
     first, _ = one.reset(seed=5, options={"staggered": True})
+    begun = one.get_state()
     for action in given[:30]:
         one.step(action)
     state = one.get_state()
@@ -203,3 +204,8 @@ def test_another_environment_goes_on_from_a_state_over_ends_of_episodes(world):
     one.set_state(state)
     assert_same_steps(one, other, given[:30])
     np.testing.assert_array_equal(one.reset(seed=5)[0], first)
+    # One that was never reset goes on from the state right after a reset.
+    fresh = made(world, 3)
+    for env in (one, fresh):
+        env.set_state(begun)
+    assert_same_steps(one, fresh, given[:10])

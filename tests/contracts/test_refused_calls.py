@@ -15,6 +15,7 @@ from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, St
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.gradients import Recorder
 from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.signals import InPlane
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
@@ -26,13 +27,10 @@ from studies.verification.strict_feedback import strict_feedback_rates
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = float("nan"), float("inf")
 RIG = Parameters()
+STREAMS = Streams(np.ones(2, dtype=np.uint64), np.zeros(2, dtype=np.int64), "reference")
 STILL = np.zeros((4, 2)), np.zeros((2, 2))
 PHASES = {"times": (0.0, 1.0), "closed_loop": (2e3, 4e3), "pneumatic1": (4600.0, 3600.0), "pneumatic2": (2300.0, 1800.0)}
 HIGH_BELOW = (2e5, 2e5, 6e5, 2e5)
-
-
-class Memory(Rows):
-    bristle = rows("z1 z2", "m", "deflections")
 
 
 class History(Rows):
@@ -93,10 +91,6 @@ COMMANDS = (
 """What a controller's command returns, and how it is named."""
 
 
-def streams():
-    return Streams(np.array([1, 2], dtype=np.uint64), np.zeros(2, dtype=np.int64), "reference")
-
-
 TABLE = {
     # what is named; what is allowed: the calls
     ("force_first = True", "False with valves = 'one_valve'"): [paper(valves="one_valve", force_first=True)],
@@ -121,7 +115,7 @@ TABLE = {
         lambda bad=bad: draw(bad, np.random.default_rng(0)) for bad in ((2.0, 1.0), (1.0, 2.0, 3.0), (0.0, NAN), ("a", "b"))
     ],
     **{
-        (f"low = {low}, high = {high}", ""): [lambda low=low, high=high: streams().integers(low, high)]
+        (f"low = {low}, high = {high}", ""): [later(STREAMS.integers, low, high)()]
         for low, high in ((5, 5), (5, 4), (0, 2**33))
     },
     ("", "float64"): [
@@ -131,8 +125,8 @@ TABLE = {
     ("tables[0] of a stage is ", "C-contiguous"): [stage(tables=(np.zeros((4, 3)).T,))],
     ("tables[1] of a stage is ", "C-contiguous"): [stage(tables=(np.zeros(3), np.zeros((1,) * 5)))],
     ("constants of a stage is ", "C-contiguous"): [stage(constants=np.zeros(4)[::2]), stage(constants=np.zeros(4, np.float32))],
-    ("rows of Memory have shape (3, 3)", "2"): [lambda: Memory(np.zeros((3, 3)))],
-    ("rows of Memory have shape (1, 3)", "2"): [lambda: Memory(np.zeros((1, 3)))],
+    ("rows of InPlane have shape (3, 3)", "2"): [lambda: InPlane(np.zeros((3, 3)))],
+    ("rows of InPlane have shape (1, 3)", "2"): [lambda: InPlane(np.zeros((1, 3)))],
     ("rows of History have shape (0, 3)", "1"): [lambda: History(np.zeros((0, 3)))],
     ("behind follows a group without a size", ""): [lambda: type("Wrong", (History,), {"behind": row("m", "")})],
     ("size", "other names"): [lambda: type("Wrong", (Rows,), {"size": row("m", "")})],

@@ -14,26 +14,16 @@ from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
-WORLDS = st.fixed_dictionaries(
-    {
-        "scenario": st.sampled_from(sorted(SCENARIOS)),
-        "num_envs": st.integers(1, 5),
-        "seed": st.integers(0, 2**63),
-        "steps": st.integers(1, 60),
-        "arguments": st.fixed_dictionaries(
-            {
-                "action_mode": st.sampled_from(("valve", "flow")),
-                "valves": st.sampled_from(("two_valves", "one_valve")),
-                "sensors": st.sampled_from(("ideal", "lab")),
-                "randomize": st.sampled_from((False, True, "plant", "scenario")),
-                "user_force": st.sampled_from((None, *HANDS)),
-                "policy_period": st.sampled_from((0.001, 0.01, 0.04)),
-                "duration": st.sampled_from((None, 0.1, 3.0)),
-                "autoreset_mode": st.sampled_from(("NextStep", "SameStep")),
-            }
-        ),
-    }
-)
+ARGUMENTS = {
+    "action_mode": ("valve", "flow"), "valves": ("two_valves", "one_valve"), "sensors": ("ideal", "lab"),
+    "randomize": (False, True, "plant", "scenario"), "user_force": (None, *HANDS), "policy_period": (0.001, 0.01, 0.04),
+    "duration": (None, 0.1, 3.0), "autoreset_mode": ("NextStep", "SameStep"),
+}  # fmt: skip
+WORLDS = st.fixed_dictionaries({
+    "scenario": st.sampled_from(sorted(SCENARIOS)), "num_envs": st.integers(1, 5), "seed": st.integers(0, 2**63),
+    "steps": st.integers(1, 60),
+    "arguments": st.fixed_dictionaries({name: st.sampled_from(values) for name, values in ARGUMENTS.items()}),
+})  # fmt: skip
 
 
 def corner(seed):

@@ -44,47 +44,34 @@ def test_a_file_that_ends_early_is_read_as_far_as_it_goes(file, tmp_path):
         assert len(load_recording(tmp_path / "torn.rec").rows) == 36
 
 
-def rewritten(path, folder, change):
-    whole = load_recording(path)
-    parts = {"header": header_of(whole.rig), "events": whole.events, "rows": np.hstack([whole.rows, whole.second])}
-    change(parts)
-    copy = folder / "changed.rec"
-    copy.write_bytes(packed(parts["header"]) + packed({"events": parts["events"]}, parts["rows"]))
-    return copy
-
-
-def put(**values):
-    return lambda parts: parts["header"].update(values)
-
-
-def events(*listed):
-    return lambda parts: parts.update(events=list(listed))
-
-
 DAMAGES = {
-    "another format": put(format="birthsim-recording-9"),
-    "other columns": put(columns=["time"]),
-    "an impossible rig": put(rig={"mechanics": {"mass": -1.0}}),
-    "a rig that is none": put(rig=3),
-    "no interval": put(interval=0.0),
-    "events that are none": events(3),
-    "no list of events": lambda parts: parts.update(events=None),
-    "an event beyond the end": events({"row": 10**6, "lost": None}),
-    "events out of order": events({"row": 5, "lost": None}, {"row": 4, "lost": None}),
-    "a path that is none": events({"row": 0, "path": [[1]]}),
-    "settings that are none": events({"row": 0, "settings": {"Kclx": [1]}}),
-    "an event of another kind": events({"row": 0, "script": "x"}),
-    "rows of another size": lambda parts: parts.update(rows=np.zeros((3, 2 * COLUMNS + 1))),
-    "no rows": lambda parts: parts.update(rows=np.zeros((0, 2 * COLUMNS)), events=[]),
-    "a header that is none": lambda parts: parts.update(header=3),
+    "another format": {"format": "birthsim-recording-9"},
+    "other columns": {"columns": ["time"]},
+    "an impossible rig": {"rig": {"mechanics": {"mass": -1.0}}},
+    "a rig that is none": {"rig": 3},
+    "no interval": {"interval": 0.0},
+    "events that are none": {"events": [3]},
+    "no list of events": {"events": None},
+    "an event beyond the end": {"events": [{"row": 10**6, "lost": None}]},
+    "events out of order": {"events": [{"row": 5, "lost": None}, {"row": 4, "lost": None}]},
+    "a path that is none": {"events": [{"row": 0, "path": [[1]]}]},
+    "settings that are none": {"events": [{"row": 0, "settings": {"Kclx": [1]}}]},
+    "an event of another kind": {"events": [{"row": 0, "script": "x"}]},
+    "rows of another size": {"rows": np.zeros((3, 2 * COLUMNS + 1))},
+    "no rows": {"rows": np.zeros((0, 2 * COLUMNS)), "events": []},
+    "a header that is none": {"header": 3},
 }
+"""What differs of the header, the events and the rows."""
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_what_is_foreign_is_refused_by_name(damage, file, tmp_path):
-    copy = rewritten(file, tmp_path, DAMAGES[damage])
+    whole, change = load_recording(file), DAMAGES[damage]
+    header = {name: change.get(name, value) for name, value in header_of(whole.rig).items()}
+    parts = {"header": header, "events": whole.events, "rows": np.hstack([whole.rows, whole.second]), **change}
+    (tmp_path / "changed.rec").write_bytes(packed(parts["header"]) + packed({"events": parts["events"]}, parts["rows"]))
     with pytest.raises(ValueError, match=r"changed.rec' is damaged or foreign .*; allowed: what birthsim live wrote"):
-        load_recording(copy)
+        load_recording(tmp_path / "changed.rec")
 
 
 def test_what_is_damaged_is_refused_by_name(file, tmp_path):

@@ -69,13 +69,7 @@ def expected(controller, settings, hold, rig):
     world = {"rig": rig, "parameters": rig.replace(changes), "valves": settings.get("valves", "two_valves")}
     world["user_force"] = Hand(scenario, settings.get("scenario_force", False), **hold)
     if "Kclx" in settings:
-        sliders = {
-            "closed_loop": (settings["Kclx"],),
-            "closed_loop_y": (2000.0,),
-            "pneumatic1": (4600.0,),
-            "pneumatic2": (2300.0,),
-        }
-        world["stiffness"] = StiffnessSchedule(**sliders)
+        world["stiffness"] = StiffnessSchedule(closed_loop=(settings["Kclx"],), closed_loop_y=(2000.0,))
     return loop_rows(scenario, settings.get("sensors", "ideal"), controller, PERIODS, **world)[:, ROWS]
 
 

@@ -3,7 +3,6 @@
 import shutil
 
 import numpy as np
-import pytest
 
 from agents import ResidualController, load_policy
 from agents.policy.seeds import SHIPPED, best_policy
@@ -15,12 +14,8 @@ from tests.live.rig.worker import run
 RIG = Parameters()
 
 
-@pytest.fixture
-def mine(tmp_path):
-    return str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
-
-
-def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine, tmp_path):
+def test_a_page_has_a_policy_of_ones_own_and_another_rig(tmp_path):
+    mine = str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
     rig = RIG.replace({"mechanics.mass": 2.5, "cylinder1.coulomb_friction": 9.0})
     packed = packed_page(rig, [mine, "forceps"])
     listed = packed.content["hello"]["choices"]["controller"]
