@@ -222,7 +222,7 @@ policies: $(READY)
 	  $(BIN)/birthsim train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; done
 	for one in $(BY_GRADIENTS); do id=$${one#*:}; $(BIN)/birthsim train --config circle_apg \
 	  --env BirthSIM/$${id%-*}Residual-$${id#*-} --seeds 5 --jobs 2 --out $(OUT)/training/$${one%:*}_apg || exit 1; done
-	$(BIN)/birthsim train --config $(HONEST) --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/$(HONEST)
+	$(BIN)/birthsim train --config $(HONEST) --seeds 5 --jobs 2 --parameters examples/calibrated_sensors_rig.toml --out $(OUT)/training/$(HONEST)
 	$(BIN)/birthsim train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
 	$(BIN)/birthsim distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
 	  --out $(OUT)/training/$(STUDENT)
