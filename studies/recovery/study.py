@@ -54,7 +54,7 @@ def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> li
         cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
         inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
         written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)
-        drawn = f"{low:g} to {high:g} {field_of(one.name).metadata['unit']}"
+        drawn = f"{f'{low:g} to ' if low < high else ''}{high:g} {field_of(one.name).metadata['unit']}"
         lines.append(f"| `{one.name}` | {drawn} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
     return lines
 

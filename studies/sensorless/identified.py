@@ -38,7 +38,8 @@ def _felt(options: Options, found: Found) -> dict[Any, Task]:
 
 def _kept(options: Options, found: Found) -> Any:
     pieces = {key: result for key, result in found.items() if isinstance(key, tuple)}
-    return {"felt": kept(("identified",), pieces), "logs": [found[seed] for seed in _logs(options)]}
+    logs = [{name: found[seed][name] for name in ("rows", "misfit")} for seed in _logs(options)]
+    return {"felt": kept(("identified",), pieces), "logs": logs}
 
 
 def _shown(content: Content) -> dict[str, str]:

@@ -123,17 +123,17 @@ def noisier(whole: Trial, pressure: float, position: float) -> Trial:
 
 @pytest.mark.slow
 def test_what_the_log_cannot_tell_keeps_the_owners_value(tmp_path: Path) -> None:
-    """Under noise eighty times that of a laboratory no log tells how stiff a bristle is."""
+    """Under noise eighty times that of a laboratory no log tells how a bristle is damped."""
     found = identify(noisier(part(trial(), 500, 3000), 4e4, 1e-2), OWNER, 0)
     rows = {row.name: row for row in found.rows}
-    kept = rows["friction.bristle_stiffness"]
+    kept = rows["friction.bristle_damping"]
     assert not kept.determined
-    assert kept.value == OWNER.friction.bristle_stiffness == found.rig.friction.bristle_stiffness
+    assert kept.value == OWNER.friction.bristle_damping == found.rig.friction.bristle_damping
     assert kept.low < kept.value < kept.high
     assert rows["valves.sonic_conductance"].determined
     found.write(tmp_path / "rig.toml", "shaken.csv")
     text = (tmp_path / "rig.toml").read_text()
-    assert "# friction.bristle_stiffness = 50000 N/m, KEPT: the log cannot tell it, it may be " in text
+    assert "# friction.bristle_damping = 150 N s/m, KEPT: the log cannot tell it, it may be " in text
     assert Parameters.from_toml(tmp_path / "rig.toml") == found.rig
     assert "least known: " in text
 
