@@ -22,10 +22,9 @@ def short(monkeypatch):
     """Few hands, a push at once, and a run of 0.15 s."""
     for name, value in (("PUSHED", 0.0), ("RELEASED", 0.05), ("JUDGED", 0.1), ("END", 0.15)):
         monkeypatch.setattr(stability, name, value)
-    for name, value in (("STIFFNESSES", (0.0, 3000.0)), ("MASSES", (0.0, 1.0, 2.0)), ("ASKED", (500.0, 2000.0))):
+    few = {"STIFFNESSES": (0.0, 3000.0), "MASSES": (0.0, 1.0, 2.0), "ASKED": (500.0, 2000.0), "FACTORS": (1.0, 2.0, 3.0)}
+    for name, value in {**few, "HANDS": ((0.0, 0.0), (2000.0, 1.0))}.items():
         monkeypatch.setattr(coupled, name, value)
-    monkeypatch.setattr(coupled, "HANDS", ((0.0, 0.0), (2000.0, 1.0)))
-    monkeypatch.setattr(coupled, "FACTORS", (1.0, 2.0, 3.0))
 
 
 @pytest.mark.usefixtures("short")
@@ -40,7 +39,7 @@ def test_a_map_of_hands_has_the_worst_rig():
 
 
 @pytest.mark.usefixtures("short")
-def test_z_width_says_what_is_refused():
+def test_z_width_says_what_is_refused(monkeypatch):
     """Rows over damping where it can be asked for, else one; setpoints without gains are refused in the law's words."""
     found = measure_z_width(**SETTINGS)
     assert found["factors"] == [1.0, 2.0, 3.0]
@@ -48,11 +47,7 @@ def test_z_width_says_what_is_refused():
     assert found["refused"] == [[None, None]] * 3
     soft = measure_z_width(**{**SETTINGS, "controller": "backstepping-cartesian"})
     assert soft["factors"] == [1.0]
-
-
-@pytest.mark.usefixtures("short")
-def test_what_is_refused_depends_on_the_sensors(monkeypatch):
-    """The paper's law takes 9000 N/m with exact and 7200 N/m with sampled positions (docs/limits.md)."""
+    # The paper's law takes 9000 N/m with exact and 7200 N/m with sampled positions (docs/limits.md).
     monkeypatch.setattr(coupled, "ASKED", (7000.0, 8000.0))
     settings = {**SETTINGS, "controller": "backstepping"}
     assert measure_z_width(**settings)["refused"][0] == [None, None]
