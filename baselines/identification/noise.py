@@ -14,13 +14,22 @@ GAUSS = 1.4826
 """Standard deviation over median size of a normal number."""
 
 
+SOME = 48
+"""Samples among which the noise is taken for the same: a tracker's grows with the distance from its transmitter."""
+
+
 def guessed_noise(trial: Trial) -> Noise:
-    """From third differences, which leave little of the motion; white noise makes them (1 + 9 + 9 + 1)^(1/2) as large."""
-    shown = trial.positions[:, fresh_rows(trial)]
-    pressure, position = (
-        float(GAUSS * np.median(np.abs(np.diff(values, 3, axis=1))) / 20**0.5) for values in (trial.pressures, shown)
-    )
+    """From third differences, which leave little of the motion."""
+    pressure, position = (_rms(values) for values in (trial.pressures, trial.positions[:, fresh_rows(trial)]))
     return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
+
+
+def _rms(values: Array) -> float:
+    """Of the noise of values (C, N): of medians, which jumps do not move. White noise makes third differences (1 + 9 + 9 +
+    1)^(1/2) as large."""
+    left = np.abs(np.diff(values, 3, axis=1)) / 20**0.5
+    parts = np.array_split(left, max(1, left.shape[1] // SOME), axis=1)
+    return GAUSS * float(np.sqrt(np.mean([np.median(part) ** 2 for part in parts])))
 
 
 def noise_from(windows: Windows, noise: Noise, slopes: Slopes, residual: Array) -> Noise:

@@ -76,6 +76,16 @@ def test_the_noise_is_found_from_the_log_alone() -> None:
     assert found.position == pytest.approx(board.position_noise, rel=0.1)
 
 
+def test_noise_that_grows_is_found_whatever_jumps() -> None:
+    """Of noise from 0.05 to 0.4 mm on moving pistons; one sample in 500 jumps by 20 mm."""
+    rng, still = np.random.default_rng(5), part(trial(), 0, 4000)
+    sizes = np.geomspace(5e-5, 4e-4, 4000)
+    jumps = 0.02 * (rng.random((2, 4000)) < 0.002)
+    moved = 0.5 + 0.1 * np.sin(np.linspace(0.0, 9.0, 4000)) + sizes * rng.normal(size=(2, 4000)) + jumps
+    found = guessed_noise(dataclasses.replace(still, positions=moved)).position
+    assert found == pytest.approx(float(np.sqrt(np.mean(sizes**2))), rel=0.05)
+
+
 def test_a_start_with_a_bristle_bent_the_wrong_way_is_mended() -> None:
     windows = cut(part(trial(), 0, 2500), TRUE)
     noise = guessed_noise(trial())
