@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -91,3 +92,12 @@ def test_motion_kernel_is_the_direct_model_and_its_rate(rig: Parameters) -> None
     p = rigid_body.pose_of(piston, rig)
     velocity, _ = by_points.cartesian_velocity(p, piston[1] + rig.geometry.k2, *speed)
     np.testing.assert_allclose(plant.end_effector(), np.concatenate([p.end_effector, velocity]), rtol=0, atol=1e-11)
+
+
+def test_pistons_at_which_the_triangle_does_not_close_are_refused():
+    """Sides d3, d6 and y1 + k1: the position named is the one furthest beyond, the bounds are those of a flat triangle."""
+    size = Parameters().geometry
+    low, high = abs(size.d3 - size.d6) - size.k1, size.d3 + size.d6 - size.k1
+    for beyond in (high + 0.1, low - 0.01):
+        with pytest.raises(ValueError, match=f"y1 = {beyond:g} m is outside the linkage; allowed: {low:g} < y1 < {high:g} m"):
+            geometry.theta1([0.0, beyond, 0.05], Parameters())
