@@ -79,10 +79,11 @@ def test_a_policy_stands_beside_its_controller_under_a_moving_hand(monkeypatch, 
     status, _, complained = call("own-motion", monkeypatch, capsys, *common)
     assert status == 0, complained
     figures = json.loads((tmp_path / "out" / "own-motion.json").read_text())["figures"]
-    law, policy = figures["moving"]
+    law, policy, steady, floor = figures["moving"]
     assert law["less"] is None
     less, low, high = policy["less"]
     assert 0.0 < low < less < high < law["error"][0]
+    assert steady["less"][0] < floor["less"][0] < law["error"][0], "a controller is no better than the bound"
     (_, stiffness), (_, other) = figures["static"].items()
     assert np.all(np.diff(stiffness) >= 0)
     assert other[0] < 3.0, "the median"
