@@ -97,7 +97,7 @@ def _compiled(functions: tuple[str, ...], target: str, threads: Threads, ending:
 
 
 class Cuda:
-    """A graphics processor of NVIDIA's, by CuPy. No test of BirthSIM has met one."""
+    """A graphics processor of NVIDIA's, by CuPy."""
 
     def __init__(self) -> None:
         try:

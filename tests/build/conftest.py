@@ -6,7 +6,9 @@ from filelock import FileLock
 from birthsim_build.code.targets import HOST
 from studies.targets.reference import PERIODS
 from studies.targets.running import node_rows
-from tests.build.targets import BUILT, build, need_linker, need_program
+from tests.build.targets import BUILT, build, device, need_linker, need_program
+
+__all__ = ["device"]
 
 
 def _once(tmp_path_factory, target, *options):

@@ -51,11 +51,15 @@ def need_threads():
         pytest.skip(f"needs Linux on x86-64 or aarch64, and LLVM {LEAST_LLVM}")
 
 
-def need_device(name):
+@pytest.fixture(params=["host", "cuda"])
+def device(request):
+    """The name of a device that is here."""
+    need_threads()
     try:
-        machine_named(name)
+        machine_named(request.param)
     except ValueError as missing:
         pytest.skip(str(missing))
+    return request.param
 
 
 def build(target, out, *options, command=loops):

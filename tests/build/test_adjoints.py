@@ -14,7 +14,7 @@ from birthsim_build.code.compiler import compile_object
 from birthsim_build.code.elf import undefined_in
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
-from birthsim_build.device.machine import Host
+from birthsim_build.device.machine import machine_named
 from birthsim_build.device.program import Pieces, program_of
 from birthsim_env.gradients import Recorder
 from birthsim_env.physics.compiled.lanes import PARAMETERS
@@ -64,26 +64,26 @@ def back_here(made, bars):
 
 @pytest.mark.parametrize("lanes", [1, 33, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", [pytest.param(name, marks=pytest.mark.slow if name != "openings" else ()) for name in CASES])
-def test_a_thread_goes_back_as_a_lane(case, lanes):
-    need_threads()
+def test_a_thread_goes_back_as_a_lane(case, lanes, device):
     here = made(lanes, **CASES[case])
     simulation, loop, rng = here.simulation, here.recorder.loop, np.random.default_rng(0)
-    there = Lanes(Host(), here.pieces, here.like, lanes, loop)
+    place = machine_named(device)
+    there = Lanes(place, here.pieces, here.like, lanes, loop)
     for _ in range(3):
         actions = rng.uniform(-0.3, 0.3, simulation.action.shape)
         simulation.action[:], simulation.impacts[:] = actions, 0.0
-        fill(there.views, here.pieces.arrays())
+        fill(there.views, map(place.arrays.asarray, here.pieces.arrays()))
         simulation.step(actions)
         tape = there.new_tape(simulation.periods)
         assert there.advance(simulation.periods, tape) == 0
         first = PARAMETERS + len(loop.live)
-        assert_same_bits(tape[:PARAMETERS], simulation.plant.lane_parameters)
-        assert_same_bits(tape[first:], flat(here.recorder._last[0], lanes))
+        assert_same_bits(place.local(tape[:PARAMETERS]), simulation.plant.lane_parameters)
+        assert_same_bits(place.local(tape[first:]), flat(here.recorder._last[0], lanes))
         bars = rng.normal(size=(len(loop.live), lanes))
-        tape[PARAMETERS:first] = bars
+        tape[PARAMETERS:first] = place.arrays.asarray(bars)
         there.back(simulation.periods, tape)
         found = back_here(here, bars)
-        assert_same_bits(tape[PARAMETERS:first], found)
+        assert_same_bits(place.local(tape[PARAMETERS:first]), found)
         assert np.abs(found - bars).max() > 0.1
 
 

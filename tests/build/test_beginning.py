@@ -17,7 +17,7 @@ from birthsim_env.loop.loop import Loop
 from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.build.targets import assert_fusing_changes_nothing, need_device, need_threads
+from tests.build.targets import assert_fusing_changes_nothing, need_threads
 from tests.build.test_device import assert_equal, assert_same_run
 from tests.build.test_threads import assert_exact
 
@@ -47,11 +47,8 @@ def made(device, case, lanes, **more):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("device", ["host", "cuda"])
 @pytest.mark.parametrize("case", CASES)
 def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
-    need_threads()
-    need_device(device)
     envs = [made(where, case, 33, max_episode_steps=3) for where in (None, device)]
     assert_same_run(*envs, 8, staggered=True)
     # Anywhere, by seeds of 64 bits, and again by the seeds of before.
@@ -62,9 +59,8 @@ def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lanes", [1, 1000])
-def test_many_and_one(lanes):
-    need_threads()
-    assert_same_run(*(made(device, "circle honest", lanes, max_episode_steps=2) for device in (None, "host")), 4)
+def test_many_and_one(lanes, device):
+    assert_same_run(*(made(place, "circle honest", lanes, max_episode_steps=2) for place in (None, device)), 4)
 
 
 @pytest.mark.slow

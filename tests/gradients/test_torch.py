@@ -74,24 +74,23 @@ def test_the_example_learns_in_a_hundred_updates() -> None:
 
 
 @pytest.mark.parametrize("sensors", ["ideal", pytest.param("honest", marks=pytest.mark.slow)])
-def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str) -> None:
+def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str, device: str) -> None:
     """Over the ends of episodes, where other rigs begin."""
-    need_threads()
     found = []
-    for device in (None, "host"):
-        worlds = worlds_of(5, randomize=True, max_episode_steps=3, sensors=sensors, device=device)
-        now, loss = worlds.reset(seed=1, options={"staggered": True}), torch.zeros(())
+    for place in (None, device):
+        worlds = worlds_of(5, randomize=True, max_episode_steps=3, sensors=sensors, device=place)
+        now, loss = worlds.reset(seed=1, options={"staggered": True}), 0.0
         actions = 0.1 * torch.sin(torch.arange(100.0).reshape(5, 5, 4))
         actions.requires_grad = True
         for action in actions:
-            now = worlds.step(now, action)
+            now = worlds.step(now, action.to(now.reward.device))
             loss = loss - now.reward.mean() + (now.motion**2).sum() + now.state[2].sum() + now.observation.sum()
         loss.backward()
         found.append((now, actions.grad))
     (one, by_one), (other, by_other) = found
     assert float(by_one.abs().min()) > 0.0
     for here, there in zip((*one, by_one), (*other, by_other), strict=True):
-        np.testing.assert_array_equal(here.detach().numpy(), there.detach().numpy())
+        np.testing.assert_array_equal(here.detach().numpy(), there.detach().cpu().numpy())
 
 
 @pytest.mark.slow

@@ -1,0 +1,3 @@
+from tests.build.targets import device
+
+__all__ = ["device"]
