@@ -14,20 +14,17 @@ from typing import Any
 from baselines.admittance.rows import Beliefs, Follower, Known, Memory, Watch
 from baselines.estimation import (
     admittance,
-    bristle_observer,
     chamber_observer,
     disturbance_observer,
-    force_bias,
-    force_observer,
     friction_level,
     inertia,
-    inertial_force,
     observers,
     reference_friction,
     stages,
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.hand import bristle_observer, force_bias, force_observer, inertial_force
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
 from birthsim_env.loop.rows import POSITION, Seen

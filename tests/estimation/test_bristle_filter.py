@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.estimation import bristle_filter
-from baselines.estimation.bristle_filter import Bristled
+from baselines.estimation.hand import bristle_filter
+from baselines.estimation.hand.bristle_filter import Bristled
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 

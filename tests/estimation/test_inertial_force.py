@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from baselines.estimation import held_force, inertial_force
-from baselines.estimation.force_observer import MOST_BIAS, Hand
-from baselines.estimation.held_force import Hold
+from baselines.estimation.hand import held_force, inertial_force
+from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
+from baselines.estimation.hand.held_force import Hold
 from baselines.estimation.inertial import Moving
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column

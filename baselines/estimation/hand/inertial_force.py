@@ -10,9 +10,9 @@ What is left at the start, before a hand comes, is taken for an error of the mas
 
 import math
 
-from baselines.estimation import force_bias, held_force
-from baselines.estimation.force_observer import MOST_BIAS, Hand
-from baselines.estimation.held_force import Hold
+from baselines.estimation.hand import force_bias, held_force
+from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
+from baselines.estimation.hand.held_force import Hold
 from baselines.estimation.inertial import Moving
 from birthsim_env.loop.signals import Joints, PerChamber
 from birthsim_env.loop.stage import scratch

@@ -6,10 +6,10 @@ What is left at the start, before a hand comes, is taken for an error of the mas
 
 import math
 
-from baselines.estimation import bristle_filter, force_bias, quiet_force
-from baselines.estimation.bristle_filter import Bristled
-from baselines.estimation.force_observer import MOST_BIAS, Hand
-from baselines.estimation.quiet_force import Quiet
+from baselines.estimation.hand import bristle_filter, force_bias, quiet_force
+from baselines.estimation.hand.bristle_filter import Bristled
+from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
+from baselines.estimation.hand.quiet_force import Quiet
 from baselines.estimation.rows import Belief, Pistons
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
