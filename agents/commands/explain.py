@@ -16,7 +16,7 @@ from birthsim_env.files import make_folder, write_json, write_text
 @dataclass(kw_only=True)
 class Settings(Configured):
     """Look into a trained residual: its correction against the weight that the controller leaves out and against friction, the
-    frictionless circle, and the stiffness test per setpoint on rigs drawn at random.
+    frictionless circle, and the stiffness test per setpoint on randomised rigs.
     """
 
     policy: Annotated[str, Parameter(metavar="DIR")] = "circle"
