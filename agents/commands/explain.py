@@ -44,7 +44,7 @@ def main(settings: Settings) -> None:
     places = policy_folders(settings.policy)
     policies = [load_policy(place) for place in places]
     if any(policy.settings.law == NO_LAW for policy in policies):
-        raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a law")
+        raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a controller")
     names = [place.name for place in places]
     weights = [inspection.weight_over_workspace(policy) for policy in policies]
     correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]

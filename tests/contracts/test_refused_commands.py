@@ -116,7 +116,10 @@ TABLE = {
     "tune --controller pid --start nowhere.json --out x": "nowhere.json'",
     "tune --controller pid --start other.json --out x": "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
     "tune --controller own.py:Tuned --start beyond.json --out x": "beyond.json' has fraction = 2.5; allowed: 0 to 2",
-    "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
+    **dict.fromkeys(
+        ("run --env BirthSIM/Forcep-v1 --out x", "run --env Forceps-v1 --out x"),
+        "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
+    ),
     "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to onnx circle --out own": "'own' is a folder; allowed: the name of a file",
     "export --to onnx circle --out own.py/policy.onnx": "'own.py': File exists",
