@@ -19,7 +19,7 @@ try:
     from agents.training.student import Lessons, teach
     from agents.training.validation import merit
 except ImportError as error:
-    raise SystemExit(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
+    raise ImportError(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
 
 TAUGHT = ("environment", "sensors", "randomize", "validation_lanes")
 """What a student's training has in common with its teacher's."""

@@ -203,10 +203,10 @@ def main(settings: Settings) -> None:
         **controller_settings(controller, rig), "own": own, "files": [*map(file_hash, own.values())],
         "sensors": list(sensors), "lanes": settings.lanes,
     }  # fmt: skip
-    check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
+    study = begun(start)
+    check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)  # which compiles: Optuna is looked for before
     trials: list[dict[str, Any]] = []
     interrupt: KeyboardInterrupt | None = None
-    study = begun(start)
     print(described(rig, True))
     with own_folder(settings.out) as folder:
         try:

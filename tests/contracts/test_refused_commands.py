@@ -159,9 +159,9 @@ TABLE = {
 
 GONE = {
     "tune --controller pid --out x": ("optuna", "tune"), "live --port 0": ("uvicorn", "live"),
-    "live --port 0 --replay a.rec": ("uvicorn", "live"),
+    "live --port 0 --replay a.rec": ("uvicorn", "live"), "export --to hub circle --out x": ("agents.policy.seeds", "agents"),
 }  # fmt: skip
-"""Command -> a package that is not installed, and the extra that has it."""
+"""Command -> a package or module that is not there, and the extra that has it."""
 TABLE |= {line: f"pip install 'birthsim[{extra}]'" for line, (_, extra) in GONE.items()}
 
 
@@ -171,7 +171,8 @@ def test_a_command_is_refused_in_one_line_and_leaves_nothing(line, tmp_path, mon
         need_linker()
     if line in GONE:
         monkeypatch.setitem(sys.modules, GONE[line][0], None)
-        monkeypatch.setattr("birthsim_live.commands.live.packed_page", None)  # before anything is compiled
+        for compiling in ("birthsim_live.commands.live.packed_page", "baselines.commands.tune.check_world"):
+            monkeypatch.setattr(compiling, None)
     monkeypatch.chdir(tmp_path)
     for name, content in FILES.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
