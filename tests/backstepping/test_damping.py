@@ -107,6 +107,8 @@ def test_setpoints_without_gains_are_refused_by_lane() -> None:
     assert np.isfinite(BacksteppingController(damping_ratio=lowest * 1.0001).command(measured, reference)).all()
     with pytest.raises(ValueError, match=rf"lane 0, cylinder 2: .*\(ratio 0.7892\) .* at 2000 N/m .*\(ratio {lowest:.4g}\)"):
         BacksteppingController(damping_ratio=lowest * 0.99).command(measured, reference)
+    with pytest.raises(ValueError, match=r"lane 0, cylinder 1: .*\(ratio 0.05\)"):
+        BacksteppingController(damping_ratio=0.05).command(measured, reference)
 
 
 def test_a_negative_setpoint_is_refused() -> None:
