@@ -109,9 +109,9 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     if about.friction_rate > 0.0:
         friction_level.learn(memory.friction, known.drag, joints, known.unexplained, about.friction_rate, belief, fresh)
     if about.weighed > 0.0:
-        place, pressures = int(about.place), memory.chambers.pressure
-        moving = Moving(seen.rows[place : place + Moving.size])
-        inertial_force.observe(memory.hand, memory.hold, seen.time, moving, joints, pressures, belief.rig, belief.period, fresh)
+        place, pressures, noise = int(about.place), memory.chambers.pressure, known.given.noise
+        moving, hand, felt = Moving(seen.rows[place : place + Moving.size]), memory.hand, memory.felt
+        inertial_force.observe(hand, felt, memory.hold, seen, moving, joints, pressures, noise, belief, fresh)
     elif about.identified > 0.0:
         pressures, noise = memory.chambers.pressure, known.given.noise
         bristle_observer.observe(memory.hand, memory.felt, seen, memory.pistons, joints, pressures, noise, belief, fresh)
