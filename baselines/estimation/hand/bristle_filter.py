@@ -132,24 +132,41 @@ def predict(
 
 
 @helper
+def _take(b: Bristled, k: int, i: int, y: float, v: float, z: float, f: float, variance: float, innovation: float) -> float:
+    """Corrects piston ``k`` of lane ``i`` by a measurement, whose covariances with the state are ``y``, ``v``, ``z`` and ``f``;
+    the squared innovation over its variance."""
+    weight = 1.0 / variance
+    e = weight * innovation
+    b.position[k, i] += y * e
+    b.speed[k, i] += v * e
+    b.bristle[k, i] += z * e
+    b.push[k, i] += f * e
+    b.yy[k, i] -= y * y * weight
+    b.yv[k, i] -= y * v * weight
+    b.yz[k, i] -= y * z * weight
+    b.yf[k, i] -= y * f * weight
+    b.vv[k, i] -= v * v * weight
+    b.vz[k, i] -= v * z * weight
+    b.vf[k, i] -= v * f * weight
+    b.zz[k, i] -= z * z * weight
+    b.zf[k, i] -= z * f * weight
+    b.ff[k, i] -= f * f * weight
+    return min(e * innovation, MOST_SURPRISE)
+
+
+@helper
 def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> None:
     """Takes a position sample of piston ``k`` of lane ``i``: what it is off, m, and its standard deviation, m."""
     yy, yv, yz, yf = b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i]
-    weight = 1.0 / (yy + noise * noise)
-    e = weight * innovation
-    b.surprise[k, i] += SHARE * (min(e * innovation, MOST_SURPRISE) - b.surprise[k, i])
-    b.position[k, i] += yy * e
-    b.speed[k, i] += yv * e
-    b.bristle[k, i] += yz * e
-    b.push[k, i] += yf * e
-    b.yy[k, i], b.yv[k, i] = yy - yy * yy * weight, yv - yy * yv * weight
-    b.yz[k, i], b.yf[k, i] = yz - yy * yz * weight, yf - yy * yf * weight
-    b.vv[k, i] -= yv * yv * weight
-    b.vz[k, i] -= yv * yz * weight
-    b.vf[k, i] -= yv * yf * weight
-    b.zz[k, i] -= yz * yz * weight
-    b.zf[k, i] -= yz * yf * weight
-    b.ff[k, i] -= yf * yf * weight
+    found = _take(b, k, i, yy, yv, yz, yf, yy + noise * noise, innovation)
+    b.surprise[k, i] += SHARE * (found - b.surprise[k, i])
+
+
+@helper
+def gauge(b: Bristled, k: int, i: int, speed: float, noise: float) -> None:
+    """Takes a ``speed`` of piston ``k`` of lane ``i``, m/s, and its standard deviation, m/s."""
+    yv, vv, vz, vf = b.yv[k, i], b.vv[k, i], b.vz[k, i], b.vf[k, i]
+    _take(b, k, i, yv, vv, vz, vf, vv + noise * noise, speed - b.speed[k, i])
 
 
 @helper
@@ -167,52 +184,15 @@ def weigh(b: Bristled, k: int, i: int, unexplained: float, noise: float, p: Rig)
     """Takes what acceleration, weight and chambers leave unexplained of piston ``k`` of lane ``i``, N, f less friction, and
     its standard deviation, N."""
     coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
-    viscous = p.fv1 if k == 0 else p.fv2
     v, z = b.speed[k, i], b.bristle[k, i]
     slack = _slack(v, coulomb, static, p)
-    bends, relaxes = 1.0 - _way(v) * z / slack, abs(v) / slack
-    hv, hz = -(viscous + p.s1 * bends), -(p.s0 - p.s1 * relaxes)
-    off = unexplained - (b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
-    yy = hv * b.yv[k, i] + hz * b.yz[k, i] + b.yf[k, i]
-    vv = hv * b.vv[k, i] + hz * b.vz[k, i] + b.vf[k, i]
-    zz = hv * b.vz[k, i] + hz * b.zz[k, i] + b.zf[k, i]
-    ff = hv * b.vf[k, i] + hz * b.zf[k, i] + b.ff[k, i]
-    weight = 1.0 / (hv * vv + hz * zz + ff + noise * noise)
-    e = weight * off
-    b.stirred[k, i] += FORCE_SHARE * (min(e * off, MOST_SURPRISE) - b.stirred[k, i])
-    b.position[k, i] += yy * e
-    b.speed[k, i] += vv * e
-    b.bristle[k, i] += zz * e
-    b.push[k, i] += ff * e
-    b.yy[k, i] -= yy * yy * weight
-    b.yv[k, i] -= yy * vv * weight
-    b.yz[k, i] -= yy * zz * weight
-    b.yf[k, i] -= yy * ff * weight
-    b.vv[k, i] -= vv * vv * weight
-    b.vz[k, i] -= vv * zz * weight
-    b.vf[k, i] -= vv * ff * weight
-    b.zz[k, i] -= zz * zz * weight
-    b.zf[k, i] -= zz * ff * weight
-    b.ff[k, i] -= ff * ff * weight
-
-
-@helper
-def gauge(b: Bristled, k: int, i: int, speed: float, noise: float) -> None:
-    """Takes a ``speed`` of piston ``k`` of lane ``i``, m/s, and its standard deviation, m/s."""
-    yv, vv, vz, vf = b.yv[k, i], b.vv[k, i], b.vz[k, i], b.vf[k, i]
-    weight = 1.0 / (vv + noise * noise)
-    e = weight * (speed - b.speed[k, i])
-    b.position[k, i] += yv * e
-    b.speed[k, i] += vv * e
-    b.bristle[k, i] += vz * e
-    b.push[k, i] += vf * e
-    b.yy[k, i] -= yv * yv * weight
-    b.yv[k, i] -= yv * vv * weight
-    b.yz[k, i] -= yv * vz * weight
-    b.yf[k, i] -= yv * vf * weight
-    b.vv[k, i] -= vv * vv * weight
-    b.vz[k, i] -= vv * vz * weight
-    b.vf[k, i] -= vv * vf * weight
-    b.zz[k, i] -= vz * vz * weight
-    b.zf[k, i] -= vz * vf * weight
-    b.ff[k, i] -= vf * vf * weight
+    # Derivatives of f less friction, to v and z.
+    to_v = -((p.fv1 if k == 0 else p.fv2) + p.s1 * (1.0 - _way(v) * z / slack))
+    to_z = -(p.s0 - p.s1 * abs(v) / slack)
+    yh = to_v * b.yv[k, i] + to_z * b.yz[k, i] + b.yf[k, i]
+    vh = to_v * b.vv[k, i] + to_z * b.vz[k, i] + b.vf[k, i]
+    zh = to_v * b.vz[k, i] + to_z * b.zz[k, i] + b.zf[k, i]
+    fh = to_v * b.vf[k, i] + to_z * b.zf[k, i] + b.ff[k, i]
+    off = unexplained - (b.push[k, i] - drag(b, k, i, p))
+    found = _take(b, k, i, yh, vh, zh, fh, to_v * vh + to_z * zh + fh + noise * noise, off)
+    b.stirred[k, i] += FORCE_SHARE * (found - b.stirred[k, i])
