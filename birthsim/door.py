@@ -43,7 +43,7 @@ GROUPS: dict[str, dict[str, Command]] = {
     "learn": {
         "train": Command("baselines", "commands.train", "policies by PPO, SAC, TQC or gradients",
             "train --config circle --seeds 5 --out out/circle"),
-        "distill": Command("agents", "commands.distill", "students without what their teachers are told",
+        "distill": Command("agents", "commands.distill", "policies with a memory, from teachers that know the rig",
             "distill --teacher out/told --out out/students"),
         "explain": Command("agents", "commands.explain", "what a trained residual has learned",
             "explain --policy circle --no-pushes --out out/explain"),

@@ -44,7 +44,7 @@ def run(settings: "Settings") -> None:
 def table(episode: dict[str, Array]) -> list[str]:
     """The hand's force and the error of every second, and of the whole episode."""
     size, force = 1e3 * np.linalg.norm(episode["tracking_error"], axis=1), np.linalg.norm(episode["user_force"], axis=1)
-    lines = [f"{'s':>9}{'hand, at most N':>18}{'error, RMS mm':>16}{'at most mm':>13}"]
+    lines = [f"{'time, s':>9}{'largest push, N':>18}{'RMS error, mm':>16}{'largest, mm':>13}"]
     seconds = np.floor(episode["time"])
     chosen = [(f"{second:.0f} to {second + 1:.0f}", seconds == second) for second in np.unique(seconds)]
     for label, rows in [*chosen, ("all", np.ones(len(size), bool))]:

@@ -14,7 +14,7 @@ FORMS: dict[str, tuple[str, str, str, str]] = {
     "c": ("birthsim_build", "build", "closed loops, as a library for this processor", "--out out/c"),
     "x86-64": ("birthsim_build", "build", "closed loops, as a library with a C header", "--out out/x86-64"),
     "aarch64": ("birthsim_build", "build", "closed loops, as a library with a C header", "--out out/aarch64"),
-    "cortex-m7": ("birthsim_build", "build", "laws alone, as an object for a microcontroller", "--out out/cortex-m7"),
+    "cortex-m7": ("birthsim_build", "build", "controllers alone, as an object for a microcontroller", "--out out/cortex-m7"),
     "ptx": ("birthsim_build", "build", "closed loops, as kernels for NVIDIA's GPUs", "--out out/ptx"),
     "cubin": ("birthsim_build", "build", "the same for one kind of GPU, by NVIDIA's ptxas", "--gpu sm_90 --out out/cubin"),
     "fmu": ("birthsim_build", "fmu", "the rig or a closed loop, for Simulink and its like", "--out rig.fmu"),

@@ -19,7 +19,7 @@ try:
     from agents.training.student import Lessons, teach
     from agents.training.validation import merit
 except ImportError as error:
-    raise SystemExit(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
+    raise ImportError(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
 
 TAUGHT = ("environment", "sensors", "randomize", "validation_lanes")
 """What a student's training has in common with its teacher's."""
@@ -27,14 +27,14 @@ TAUGHT = ("environment", "sensors", "randomize", "validation_lanes")
 
 @dataclass(kw_only=True)
 class Settings(Configured):
-    """Recurrent students learn from privileged policies to act without what those are told.
+    """Train recurrent policies, the students: from measurements alone they imitate teachers that know the true rig.
 
     A folder gets the best student so far after every round. Interrupted, the same command goes on with the seeds that are not
     done.
     """
 
     teacher: Annotated[Path, Parameter(metavar="DIR")]
-    """Privileged policies: seed_0 ... in it."""
+    """Folder of the teachers, seed_0 and so on in it."""
     hidden: Annotated[int, whole(1, 512)] = Lessons.hidden
     """Cells of memory."""
     rounds: Annotated[int, whole(1, 1000)] = Lessons.rounds

@@ -16,7 +16,7 @@ from birthsim_env.files import make_folder, write_json, write_text
 @dataclass(kw_only=True)
 class Settings(Configured):
     """Look into a trained residual: its correction against the weight that the controller leaves out and against friction, the
-    frictionless circle, and the stiffness test per setpoint on rigs drawn at random.
+    frictionless circle, and the stiffness test per setpoint on randomised rigs.
     """
 
     policy: Annotated[str, Parameter(metavar="DIR")] = "circle"
@@ -44,7 +44,7 @@ def main(settings: Settings) -> None:
     places = policy_folders(settings.policy)
     policies = [load_policy(place) for place in places]
     if any(policy.settings.law == NO_LAW for policy in policies):
-        raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a law")
+        raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a controller")
     names = [place.name for place in places]
     weights = [inspection.weight_over_workspace(policy) for policy in policies]
     correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]

@@ -33,9 +33,12 @@ def main(settings: Settings) -> None:
 
 
 def _write_folder(settings: Settings) -> None:
-    from agents.policy.files import WEIGHTS
-    from agents.policy.seeds import best_policy
-    from agents.reports.card import TRAINING, compared, model_card
+    try:
+        from agents.policy.files import WEIGHTS
+        from agents.policy.seeds import best_policy
+        from agents.reports.card import TRAINING, compared, model_card
+    except ImportError as error:
+        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
 
     folder = best_policy(settings.policy)
     card = model_card(folder, f"birthsim-{Path(settings.policy).name}", compared(folder))

@@ -92,6 +92,6 @@ def _report(
     last = [result["curve"][-1] for result in results]
     print(", ".join(f"{point['steps']:,}" for point in last), f"of {training.steps:,} steps;", end=" ")
     seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
-    print(f"{seconds} s per seed with validation; of the rest")
+    print(f"{seconds} s per seed with validation; the time of training alone:")
     for seed, result in zip(seeds, results, strict=True):
         print(f"seed {seed}: {shares(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")

@@ -13,6 +13,9 @@ from baselines.staged import NO_ACTION, driving
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
+BAR = "{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:g} s [{elapsed}<{remaining}]"
+"""Progress in seconds of the episode."""
+
 
 def driven(environment: str, controller: str, rig: Parameters, **arguments: Any) -> Any:
     """An environment in which a controller by name acts at every control period; ``residual`` has the policy shipped for it."""
@@ -30,7 +33,7 @@ def record(
     _, info = env.reset(seed=seed)
     rows: dict[str, list[Any]] = {**{name: [np.copy(info[name])] for name in fields}, "lost": [False]}
     ended = False
-    with tqdm(total=env.get_wrapper_attr("duration"), desc=title, unit=" s", leave=False) as bar:
+    with tqdm(total=env.get_wrapper_attr("duration"), desc=title, unit=" s", bar_format=BAR, leave=False) as bar:
         while not ended:
             _, _, lost, truncated, info = env.step(NO_ACTION)
             for name in fields:

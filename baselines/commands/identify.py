@@ -73,7 +73,7 @@ def _propose(settings: Settings, path: Path, rig: Parameters) -> None:
         raise ValueError("--out is given; allowed with LOG or --simulate, --propose names its own file")
     plan = propose(rig, DURATION if settings.duration is None else settings.duration, settings.seed)
     plan.write(path)
-    print(f"written to {path}: {len(plan.times)} rows of time, target and openings to add to a law's")
+    print(f"written to {path}: {len(plan.times)} rows of time, target and openings to add to a controller's")
 
 
 def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:

@@ -91,8 +91,8 @@ Set = Annotated[
     MANY,
     Parameter(
         group=CONTROL, metavar="GAIN=VALUE...",
-        help="Gains and other options of the controllers that have them, such as --set bandwidth=60; one of several takes "
-        "them by name: 'pid[bandwidth=60]'.",
+        help="Gains and other options of every controller named that has them, such as bandwidth=60; for one of them alone "
+        "write 'pid[bandwidth=60]' as its name.",
     ),
 ]  # fmt: skip
 
@@ -105,7 +105,7 @@ class Configured:
     """What every command with options has."""
 
     config: Annotated[Path | None, Parameter(metavar="FILE")] = None
-    """TOML file of these options, as episodes = 64; what is typed counts more."""
+    """TOML file of these options, such as seed = 1; those of the command line override it."""
 
     def shown(self) -> dict[str, Any]:
         """What results depend on, as JSON."""

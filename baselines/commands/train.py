@@ -26,13 +26,13 @@ class Settings:
     law: Annotated[str | None, Parameter(metavar="NAME")] = None
     """Controller underneath, such as backstepping-force-first; none: the policy drives the valves by itself."""
     impedance: Literal["fixed", "variable_kp", "variable"] | None = None
-    """What an action sets beside forces."""
+    """What an action changes besides forces."""
     authority: Annotated[float | None, Parameter(metavar="N")] = None
     """Bound of the residual force."""
     steps: Annotated[int | None, whole()] = None
     """Policy steps of each seed."""
     until: Annotated[float | None, Parameter(metavar="PERCENT")] = None
-    """End once the error in validation is so far below that of the paper's controller."""
+    """Stop once the validation error is this far below that of the paper's controller."""
     seed: Seed | None = None
     """First seed, else the configuration's, 0."""
     seeds: Annotated[int, whole()] = 1

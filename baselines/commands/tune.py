@@ -172,10 +172,10 @@ def search(
 
 @dataclass(kw_only=True)
 class Settings(Parts):
-    """Tune a controller's gains on rigs drawn at random; interrupted (Ctrl-C), the same command carries on."""
+    """Tune a controller's gains on randomised rigs; interrupted (Ctrl-C), the same command carries on."""
 
     controller: Annotated[str, CONTROLLER]
-    """A name, or path/to/file.py:Class, with TUNABLE."""
+    """A name, or path/to/file.py:Class whose TUNABLE has the range of each gain."""
     set: Set = field(default_factory=list)
     trials: Annotated[int, whole(1, TRIALS)] = 60
     """Sets of gains to try."""
@@ -203,10 +203,10 @@ def main(settings: Settings) -> None:
         **controller_settings(controller, rig), "own": own, "files": [*map(file_hash, own.values())],
         "sensors": list(sensors), "lanes": settings.lanes,
     }  # fmt: skip
-    check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
+    study = begun(start)
+    check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)  # which compiles: Optuna is looked for before
     trials: list[dict[str, Any]] = []
     interrupt: KeyboardInterrupt | None = None
-    study = begun(start)
     print(described(rig, True))
     with own_folder(settings.out) as folder:
         try:

@@ -13,7 +13,9 @@ def check_environment(name: str, residual: bool = False) -> None:
     """Raises ``ValueError`` for an id that is none of the experiments, or else of those with a law inside."""
     known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and ("Residual" in one) == residual)
     if name not in known:
-        raise ValueError(f"--env {name!r}{near(name, known)}; allowed: {', '.join(known)}")
+        whole = f"BirthSIM/{name}"
+        asked = near(whole if whole in known else name, known)
+        raise ValueError(f"--env {name!r}{asked}; allowed: {', '.join(known)}")
 
 
 def check_world(environment: str, **arguments: Any) -> None:

@@ -67,14 +67,14 @@ def main(settings: Settings) -> None:
         raise ValueError(f"--seed with {target}; allowed: with other targets, kernels are told it where they run")
     rig = load_parameters(settings.parameters)
     scenarios, sensors, controllers, policies = _chosen(settings)
-    bundle = None
-    if not threads:
-        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed or 0, target == "cortex-m7")
     require_llvm()
     if target == "cubin":
         require_assembler()
     elif not threads and target != "cortex-m7":
         require_linker()
+    bundle = None
+    if not threads:  # which compiles: what it needs is looked for before
+        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed or 0, target == "cortex-m7")
     folder = make_folder(settings.out)
     with whole_results(folder) as place:
         if bundle is None:
@@ -98,7 +98,7 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
     if settings.all and named:
         raise ValueError(f"--all with --{named[0]}; allowed: one of them")
     if settings.to == "cortex-m7" and settings.env:
-        raise ValueError("--env with cortex-m7; allowed: without it, the object has the laws alone")
+        raise ValueError("--env with cortex-m7; allowed: without it, the object has the controllers alone")
     if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:

@@ -29,7 +29,7 @@ class Settings(Configured):
     host: str = "127.0.0.1"
     """Address or name to serve; other than the loopback it lets in everybody who can reach it."""
     request_time: Annotated[float, number("S", above=0.0, most=3600.0)] = 10.0
-    """Seconds in which a request must arrive, assumed; then its connection is closed."""
+    """Seconds in which a request must arrive; then its connection is closed."""
     parameters: RigFile = None
     controller: Annotated[str | None, Parameter(group=CONTROL, metavar="NAME")] = None
     """Open with it, as pid[bandwidth=60]; your own, path/to/file.py:Class, runs in Python, and the rig waits for it."""

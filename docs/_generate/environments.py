@@ -43,7 +43,7 @@ def _shared() -> str:
         f"Version of the package: {birthsim_env.__version__}. The full contract of an environment is its docstring, "
         f"{{py:class}}`birthsim_env.env.BirthSIMEnv`.", "",
         "### Observation", "",
-        f"Entries are what the sensors say over the scale in the last column, clipped to ±{observation.LIMIT:g}; "
+        f"Each entry is a reading divided by the scale in the last column, clipped to ±{observation.LIMIT:g}; "
         "the last action follows them.", "",
         "| index | entry | value that maps to 1 |", "|---|---|---|", *rows, "",
         "### Reward", "", terms, "",

@@ -103,7 +103,7 @@ def beginning(clock: Clock, device: str | None, lanes: int, name: str, **argumen
 
 def going_back(clock: Clock, device: str | None, lanes: int, name: str, **arguments: Any) -> float:
     """Policy steps/s forward on a tape, and back."""
-    env = gymnasium.make_vec(name, num_envs=lanes, randomize=True, device=device, autoreset_mode="SameStep", **arguments)
+    env: Any = gymnasium.make_vec(name, num_envs=lanes, randomize=True, device=device, autoreset_mode="SameStep", **arguments)
     recorder, xp = env.unwrapped.record(), np if device is None else clock.arrays
     env.reset(seed=0, options={"staggered": True})
     ones, action = xp.ones(lanes), xp.zeros(env.action_space.shape, dtype=np.float32)
@@ -117,7 +117,7 @@ def going_back(clock: Clock, device: str | None, lanes: int, name: str, **argume
 
 def rows(clock: Clock, device: str, most: int) -> list[tuple[str, ...]]:
     """A row a loop and number of lanes, below the head."""
-    found = [("loop", "lanes", "steps/s", "copied", "beginnings/s", "steps/s with gradients")]
+    found: list[tuple[str, ...]] = [("loop", "lanes", "steps/s", "copied", "beginnings/s", "steps/s with gradients")]
     for label, (name, arguments) in LOOPS.items():
         for lanes in (None, *(1 << k for k in range(10, 21, 2) if 1 << k <= most)):
             place, count = (device, lanes) if lanes else (None, NATIVE_LANES)

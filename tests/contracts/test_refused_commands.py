@@ -116,7 +116,10 @@ TABLE = {
     "tune --controller pid --start nowhere.json --out x": "nowhere.json'",
     "tune --controller pid --start other.json --out x": "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
     "tune --controller own.py:Tuned --start beyond.json --out x": "beyond.json' has fraction = 2.5; allowed: 0 to 2",
-    "run --env BirthSIM/Forcep-v1 --out x": "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
+    **dict.fromkeys(
+        ("run --env BirthSIM/Forcep-v1 --out x", "run --env Forceps-v1 --out x"),
+        "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/",
+    ),
     "export --to onnx nowhere": "policy = 'nowhere'",
     "export --to onnx circle --out own": "'own' is a folder; allowed: the name of a file",
     "export --to onnx circle --out own.py/policy.onnx": "'own.py': File exists",
@@ -156,9 +159,9 @@ TABLE = {
 
 GONE = {
     "tune --controller pid --out x": ("optuna", "tune"), "live --port 0": ("uvicorn", "live"),
-    "live --port 0 --replay a.rec": ("uvicorn", "live"),
+    "live --port 0 --replay a.rec": ("uvicorn", "live"), "export --to hub circle --out x": ("agents.policy.seeds", "agents"),
 }  # fmt: skip
-"""Command -> a package that is not installed, and the extra that has it."""
+"""Command -> a package or module that is not there, and the extra that has it."""
 TABLE |= {line: f"pip install 'birthsim[{extra}]'" for line, (_, extra) in GONE.items()}
 
 
@@ -168,7 +171,8 @@ def test_a_command_is_refused_in_one_line_and_leaves_nothing(line, tmp_path, mon
         need_linker()
     if line in GONE:
         monkeypatch.setitem(sys.modules, GONE[line][0], None)
-        monkeypatch.setattr("birthsim_live.commands.live.packed_page", None)  # before anything is compiled
+        for compiling in ("birthsim_live.commands.live.packed_page", "baselines.commands.tune.check_world"):
+            monkeypatch.setattr(compiling, None)
     monkeypatch.chdir(tmp_path)
     for name, content in FILES.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)

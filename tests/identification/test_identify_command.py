@@ -17,7 +17,7 @@ def test_experiment_and_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cap
     plan, log, rig = tmp_path / "plan.csv", tmp_path / "log.csv", tmp_path / "true.toml"
     TRUE.to_toml(rig)
     status, printed, _ = call("identify", monkeypatch, capsys, "--propose", plan, "--duration", 4, "--seed", 3)
-    assert (status, printed) == (0, f"written to {plan}: 401 rows of time, target and openings to add to a law's\n")
+    assert (status, printed) == (0, f"written to {plan}: 401 rows of time, target and openings to add to a controller's\n")
     believed: list[Parameters] = []
     made = identify.make_controller
     monkeypatch.setattr(identify, "make_controller", lambda name, rig: believed.append(rig) or made(name, rig))
