@@ -10,7 +10,7 @@ residual. It then works with less stiffness, until the swing has died.
 """
 
 from baselines.backstepping.cartesian_law import across, along
-from baselines.estimation.half_wave import HalfWave, sustained
+from baselines.estimation.hand.half_wave import HalfWave, sustained
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact

@@ -138,7 +138,7 @@ class AdmittanceController(StagedController):
         board, learns_force = rig.electronics, self._learn and self._force_sensor
         fixed = self._force_sensor and not self._learn
         inert = sampled and self._learn and board.acceleration_bandwidth > 0
-        sampled = sampled and not inert
+        sampled, weighed = sampled and not inert, inert and not self._force_sensor
         kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
         tuned, least, falls = self.TUNED[kind], LEAST_FRACTION, 1.0
         if sampled and learns_force:
@@ -149,9 +149,9 @@ class AdmittanceController(StagedController):
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
         follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
         about = knowledge.beliefs(
-            rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
+            rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=(sampled and self._learn) or weighed,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
-            identified=self._identified, learns_mass=sampled and learns_force, weighed=inert and not self._force_sensor,
+            identified=self._identified, learns_mass=sampled and learns_force, weighed=weighed,
             believed_limit=knowledge.BELIEVED_LIMIT if inert or fixed else knowledge.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )  # fmt: skip

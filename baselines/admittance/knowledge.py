@@ -14,20 +14,17 @@ from typing import Any
 from baselines.admittance.rows import Beliefs, Follower, Known, Memory, Watch
 from baselines.estimation import (
     admittance,
-    bristle_observer,
     chamber_observer,
     disturbance_observer,
-    force_bias,
-    force_observer,
     friction_level,
     inertia,
-    inertial_force,
     observers,
     reference_friction,
     stages,
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.hand import bristle_observer, force_bias, force_observer, inertial_force
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
 from birthsim_env.loop.rows import POSITION, Seen
@@ -112,9 +109,9 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     if about.friction_rate > 0.0:
         friction_level.learn(memory.friction, known.drag, joints, known.unexplained, about.friction_rate, belief, fresh)
     if about.weighed > 0.0:
-        place, pressures = int(about.place), memory.chambers.pressure
-        moving = Moving(seen.rows[place : place + Moving.size])
-        inertial_force.observe(memory.hand, memory.hold, seen.time, moving, joints, pressures, belief.rig, belief.period, fresh)
+        place, pressures, noise = int(about.place), memory.chambers.pressure, known.given.noise
+        moving, hand, felt = Moving(seen.rows[place : place + Moving.size]), memory.hand, memory.felt
+        inertial_force.observe(hand, felt, memory.hold, seen, moving, joints, pressures, noise, belief, fresh)
     elif about.identified > 0.0:
         pressures, noise = memory.chambers.pressure, known.given.noise
         bristle_observer.observe(memory.hand, memory.felt, seen, memory.pistons, joints, pressures, noise, belief, fresh)

@@ -18,7 +18,7 @@ with the forces unseen of ``knowledge``: believed friction and what an observer 
 from baselines.admittance import knowledge
 from baselines.admittance.rows import Constants, Follower, Gains, Known, Memory, Watch
 from baselines.backstepping.cartesian_law import across, along, load_rates
-from baselines.estimation.half_wave import sustained
+from baselines.estimation.hand.half_wave import sustained
 from baselines.estimation.rows import Belief
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen

@@ -1,12 +1,12 @@
 """Rows of the admittance law: what it remembers, what it knows at one instant, and its constants."""
 
 from baselines.estimation.admittance import Compliance
-from baselines.estimation.bristle_observer import Felt
 from baselines.estimation.chamber_observer import Chambers
-from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.half_wave import HalfWave
-from baselines.estimation.held_force import Hold
+from baselines.estimation.hand.bristle_observer import Felt
+from baselines.estimation.hand.force_observer import Hand
+from baselines.estimation.hand.half_wave import HalfWave
+from baselines.estimation.hand.held_force import Hold
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker

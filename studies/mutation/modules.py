@@ -21,7 +21,7 @@ MODULES = {
     "baselines.backstepping.cartesian_law": ("cartesian_backstepping",),
     "baselines.backstepping.cartesian_stiffness": ("cartesian_stiffness", "backstepping"),
     "baselines.admittance.law": ("admittance_law", "admittance_backstepping"),
-    "baselines.valve_inverse": ("valve_inverse", "backstepping", "one_valve", "force_first"),
+    "baselines.valve_inverse": ("valve_inverse", "admittance_law", "backstepping", "one_valve", "force_first"),
 }
 """The test files (``tests/*/test_*.py``) that concern a module, the quickest first."""
 

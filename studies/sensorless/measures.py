@@ -36,24 +36,27 @@ def measure(
     controller: str, source: str, rig: dict[str, Any], sensors: str, force_sensor: bool, seed: int, lanes: int
 ) -> Result:  # fmt: skip
     """Of worlds with the seeds ``seed`` on, lists over them by names of ``COLUMNS`` and scenarios; ``rig`` is as believed."""
-    condition = Condition(controller, Parameters.from_dict(rig), sensors, seed, lanes, force_sensor)
-    found = {**_episodes(condition, lanes), **_clamped(condition)}
-    found["noticed"] = shaken(condition.law(), condition.drawn(), sensors, seed, force_sensor)["noticed"]
+    return felt(Condition(controller, Parameters.from_dict(rig), sensors, seed, lanes, force_sensor))
+
+
+def felt(condition: Condition) -> Result:
+    """Of the worlds of a condition, lists as those of ``measure``."""
+    found = {**_episodes(condition), **_clamped(condition)}
+    port = condition.sensors, condition.seed, condition.force_sensor
+    found["noticed"] = shaken(condition.law(), condition.drawn(), *port)["noticed"]
     pulled = [_pulled(condition, pull) for pull in PULLS]
     found["overshoot"] = np.concatenate([one["overshoot"] for one in pulled])
     found["lost"] = np.concatenate([found["lost"], *(one["lost"] for one in pulled)])
     return {name: np.asarray(values, dtype=np.float64).tolist() for name, values in found.items()}
 
 
-def _episodes(condition: Condition, lanes: int) -> dict[str, Any]:
+def _episodes(condition: Condition) -> dict[str, Any]:
     """Of all scenarios, each of which draws what it asks for: settled errors, and what the push of ``probe`` tells."""
     worlds: Arguments = {"sensors": condition.sensors, "randomize": True, "parameters": condition.rig}
+    who, count, seed = condition.controller, condition.rigs, condition.seed
     episodes = {
-        name: evaluate(
-            environment_id(name), condition.law(), condition.controller, lanes, condition.seed, progress=False, **worlds
-        )
-        for name in SCENARIOS
-    }  # fmt: skip
+        name: evaluate(environment_id(name), condition.law(), who, count, seed, progress=False, **worlds) for name in SCENARIOS
+    }
     probe = episodes["probe"].metrics
     return {
         "stiffness_error": np.abs(probe["stiffness_error"]), "air": probe["air"],

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-import numpy as np
-
 from baselines.backstepping.controller import BacksteppingController
 from baselines.identification.experiment import propose
 from baselines.identification.identified import identify
@@ -17,9 +15,8 @@ from baselines.work.tasks import Result
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.comparison.grid import as_described
 from studies.haptics.worlds import Condition
-from studies.sensorless.measures import PULLS, _clamped, _episodes, _pulled
+from studies.sensorless.measures import felt
 from studies.sensorless.told import Told
-from studies.shaken import shaken
 
 SENSORS = "honest"
 
@@ -58,10 +55,4 @@ def measure(
     owner = Parameters.from_dict(rig)
     board = {"electronics.acceleration_bandwidth": owner.electronics.acceleration_bandwidth}
     rigs = [Parameters.from_dict(one).replace(board) for one in told]
-    condition = Informed(controller, owner, SENSORS, seed, len(rigs), force_sensor, rigs)
-    found = {**_episodes(condition, len(rigs)), **_clamped(condition)}
-    found["noticed"] = shaken(condition.law(), condition.drawn(), SENSORS, seed, force_sensor)["noticed"]
-    pulled = [_pulled(condition, pull) for pull in PULLS]
-    found["overshoot"] = np.concatenate([one["overshoot"] for one in pulled])
-    found["lost"] = np.concatenate([found["lost"], *(one["lost"] for one in pulled)])
-    return {name: np.asarray(values, dtype=np.float64).tolist() for name, values in found.items()}
+    return felt(Informed(controller, owner, SENSORS, seed, len(rigs), force_sensor, rigs))

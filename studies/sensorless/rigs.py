@@ -2,28 +2,24 @@
 
 from collections.abc import Mapping
 
-from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
-from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from studies.comparison.grid import as_described
 
 OFF = 0.05
 """Fraction by which figures of a known rig are off at most; ``birthsim identify`` leaves as much of friction after 5 s."""
 
-PLANTS = ("nominal", "randomised", "known")
-"""The rig is as believed; drawn from the documented ranges while the default is believed; or believed to within ``OFF``."""
+PLANTS = ("nominal", "randomised")
+"""The rig is as believed, or drawn from the documented ranges while the default is believed."""
 
 
-def believed(rig: Parameters, plant: str, seed: int) -> Parameters:
+def believed(rig: Parameters, plant: str) -> Parameters:
     """What a controller believes, with the ranges from which the true rigs are drawn. Sensors have the figures of ``rig``."""
     described = as_described(rig)
-    ranges = documented_ranges(described)
     if plant == "randomised":
         return described
-    centre = draw_parameters(described, ranges, stream(seed, 0, "parameters")) if plant == "known" else described
-    off = OFF if plant == "known" else 0.0
-    near = {name: around(centre, name, off) for name in ranges}
-    return _with(centre, {**{name: (low, high) for name, low, high in described.ranges}, **near})
+    exact = {name: around(described, name, 0.0) for name in documented_ranges(described)}
+    return _with(described, {**{name: (low, high) for name, low, high in described.ranges}, **exact})
 
 
 def around(rig: Parameters, name: str, off: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from studies.sensorless.measures import measure
-from studies.sensorless.rigs import OFF, PLANTS, believed
+from studies.sensorless.rigs import PLANTS, believed
 from studies.study import Found, Options, Study
 from studies.tables import cells, markdown
 
@@ -25,8 +25,8 @@ RIGS = {
 }
 """Sensors besides positions and pressures -> the controller that makes the best of them, and its rig."""
 
-LANES = {"nominal": 64, "randomised": 64, "known": 16}
-"""Worlds of a piece, which share what the controller believes."""
+LANES = 64
+"""Worlds of a piece."""
 
 COLUMNS = {
     "stiffness_error": "stiffness error, %", "hunting": "hunting, mm", "clamped_mm": "held by a clamp, mm", "clamped_N": "N",
@@ -39,12 +39,10 @@ def _tasks(options: Options) -> dict[Any, Task]:
     found = {}
     for (rig, (controller, file)), plant in product(RIGS.items(), options.plant):
         parameters = load_parameters(ROOT / file if file else None)
-        for first in range(options.seed, options.seed + options.episodes, LANES[plant]):
-            own = controller_settings(controller, believed(parameters, plant, first))
-            more = {
-                "sensors": "honest", "force_sensor": rig == "force", "seed": first,
-                "lanes": min(LANES[plant], options.seed + options.episodes - first),
-            }  # fmt: skip
+        own, last = controller_settings(controller, believed(parameters, plant)), options.seed + options.episodes
+        for first in range(options.seed, last, LANES):
+            lanes = min(LANES, last - first)
+            more = {"sensors": "honest", "force_sensor": rig == "force", "seed": first, "lanes": lanes}
             found[rig, plant, first] = Task(f"{stem_of(rig)}/{plant}-{first}", measure, {**own, **more})
     return found
 
@@ -68,12 +66,12 @@ def kept(plants: Iterable[str], found: Found) -> Any:
 
 def tables(figures: Any) -> str:
     """What a hand feels, and errors by scenario."""
-    words, found = {"known": f"known to {100 * OFF:g} %"}, []
+    found = []
     for names, titles in ((COLUMNS, list(COLUMNS.values())), (SCENARIOS, [f"{name}: settled error, mm" for name in SCENARIOS])):
         rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
         for row in figures:
             shown = [cells(row["figures"][name][:2]) for name in names]
-            rows.append([row["rig"], words.get(row["plant"], row["plant"]), *shown, f"{row['lost']} of {row['of']}"])
+            rows.append([row["rig"], row["plant"], *shown, f"{row['lost']} of {row['of']}"])
         found.append(markdown(rows))
     return "\n\n".join(found) + "\n"
 

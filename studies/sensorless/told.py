@@ -11,9 +11,11 @@ from birthsim_env.loop.stage import address_of, call, numbers
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 
+ADDRESS, COUNT = range(2)
+"""Numbers before the constants of the lanes: the address of a stage, exact below 2^53, and how many constants a lane has."""
+
 HEAD, NUMBER = 2, 8
-"""Numbers before the constants of the lanes: the address of a stage, exact below 2^53, and how many constants a lane has; bytes
-of a number."""
+"""How many there are, and bytes of a number."""
 
 
 @kernel
@@ -21,8 +23,8 @@ def each(world: int, seen: int, memory: int, constants: int, tables: int, lane: 
     """A stage on one column of the block after another, with the constants of each lane."""
     head, missed = numbers(constants, HEAD), 0
     for i in range(n):
-        own = constants + NUMBER * (HEAD + (lane + i) * int(head[1]))
-        missed += call(int(head[0]), world, seen + NUMBER * i, memory + NUMBER * i, own, tables, lane + i, 1)
+        own = constants + NUMBER * (HEAD + (lane + i) * int(head[COUNT]))
+        missed += call(int(head[ADDRESS]), world, seen + NUMBER * i, memory + NUMBER * i, own, tables, lane + i, 1)
     return missed
 
 

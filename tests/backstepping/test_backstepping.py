@@ -124,7 +124,7 @@ def test_a_damping_factor_multiplies_the_damping_of_equal_gains_and_leaves_the_s
 
 
 def test_a_damping_factor_up_to_its_least_is_bit_for_bit_the_law() -> None:
-    s = random_situations(Parameters(), 0.01, True, 200, np.random.default_rng(3))
+    s = random_situations(Parameters(), 0.01, True, 40, np.random.default_rng(3))
     signals, told = as_signals(s, Parameters()), (s["believed"], s["feedforward_rate"])
     factor = np.resize([0.0, 0.5, 1.0, 1.01], s["piston"].shape[1])
     for options in OPTIONS.values():

@@ -100,4 +100,11 @@ def test_equal_gains_are_refused_below_the_least_stiffness() -> None:
         assert c[0] == c[1] == c[2] == equal_gain(least * 1.2, mass, viscous)
         with pytest.raises(ValueError, match=rf"stiffness = .* N/m has no equal gains .* allowed: more than {least:g} N/m"):
             gains_for(least * 0.9, mass, viscous)
+    assert equal_gain_misses(2.0, 3.0, 0.0) == 1, "without friction the least, two thirds of the mass, is a gain of zero"
     assert equal_gain_misses(np.nan, 3.0, 35.0) == 0, "a state out of range is not the setpoint's fault"
+    right = {"stiffness": 2000.0, "apparent_mass": 3.0, "viscous": 35.0, "damping": 200.0}
+    for name, wrong in (("stiffness", 0.0), ("apparent_mass", 0.0), ("viscous", -1.0), ("damping", 0.0)):
+        with pytest.raises(ValueError, match=rf"{name} = {wrong}; allowed: a .*(positive|>= 0)"):
+            gains_for(**(right | {name: wrong}))
+    with pytest.raises(ValueError, match=r"stiffness = 3 N/m; allowed with a damping: more than m_e/s2 = 3 N/m"):
+        gains_for(**(right | {"stiffness": 3.0}))

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from baselines.estimation import force_bias, force_observer, friction_level, inertia, observers, tracker_noise
-from baselines.estimation.force_observer import Hand
+from baselines.estimation import friction_level, inertia, observers, tracker_noise
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.hand import force_bias, force_observer
+from baselines.estimation.hand.force_observer import Hand
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.estimation import bristle_filter
-from baselines.estimation.bristle_filter import Bristled
+from baselines.estimation.hand import bristle_filter
+from baselines.estimation.hand.bristle_filter import Bristled
+from baselines.estimation.hand.bristle_observer import PUSH_NOISE
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -35,9 +36,9 @@ def found(load, push, seconds, seed):
     time = np.arange(round(seconds / PERIOD)) * PERIOD
     path, rng = piston(time, lambda t: load(t) + push(t)), np.random.default_rng(seed)
     b, forces = Bristled(np.zeros((Bristled.size, 1))), np.empty(len(time))
-    bristle_filter.begin(b, 1, 0, path[0], 0.0, NOISE, P)
+    bristle_filter.begin(b, 1, 0, path[0], 0.0, 0.0, NOISE, P)
     for k, t in enumerate(time):
-        bristle_filter.predict(b, 1, 0, load(t - PERIOD / 2), 0.0, 1.0 / MASS, P, PERIOD)
+        bristle_filter.predict(b, 1, 0, load(t - PERIOD / 2), 0.0, 1.0 / MASS, PUSH_NOISE, P, PERIOD)
         if k % 4 == 0:
             bristle_filter.correct(b, 1, 0, path[k] + NOISE * rng.standard_normal() - b.position[1, 0], NOISE)
         forces[k] = b.push[1, 0]
@@ -62,6 +63,23 @@ def test_a_hand_that_makes_the_piston_slide_is_found_beyond_its_friction():
     assert forces[time > 1.0] == pytest.approx(45.0, abs=3.0)
 
 
+def believed(state, covariance):
+    """A filter of piston 2 with a ``state`` y, v, z, f, and its ``covariance`` (4, 4)."""
+    b = Bristled(np.zeros((Bristled.size, 1)))
+    b.position[1], b.speed[1], b.bristle[1], b.push[1] = state
+    b.surprise[1] = 1.0
+    for name, (i, j) in zip(COVARIANCE, zip(*np.triu_indices(4), strict=True), strict=True):
+        getattr(b, name)[1] = covariance[i, j]
+    return b
+
+
+def read(b):
+    """State (4,) and upper triangle of the covariance (4, 4) of piston 2."""
+    after = np.zeros((4, 4))
+    after[np.triu_indices(4)] = [getattr(b, name)[1, 0] for name in COVARIANCE]
+    return np.array([b.position[1, 0], b.speed[1, 0], b.bristle[1, 0], b.push[1, 0]]), after
+
+
 @pytest.mark.parametrize("speed", [0.003, -0.2])
 def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
     """P' = A P A^T + Q with A from central differences of the step itself."""
@@ -70,21 +88,15 @@ def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
     before, start = root @ root.T, np.array([0.01, speed, 1e-4 * np.sign(speed), 5.0])
 
     def step(state, covariance=before):
-        b = Bristled(np.zeros((Bristled.size, 1)))
-        b.position[1], b.speed[1], b.bristle[1], b.push[1] = state
-        b.surprise[1] = 1.0
-        for name, (i, j) in zip(COVARIANCE, zip(*np.triu_indices(4), strict=True), strict=True):
-            getattr(b, name)[1] = covariance[i, j]
-        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, P, PERIOD)
-        after = np.zeros((4, 4))
-        after[np.triu_indices(4)] = [getattr(b, name)[1, 0] for name in COVARIANCE]
-        return np.array([b.position[1, 0], b.speed[1, 0], b.bristle[1, 0], b.push[1, 0]]), after
+        b = believed(state, covariance)
+        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, PUSH_NOISE, P, PERIOD)
+        return read(b)
 
     sizes = np.array([1e-7, 1e-6, 1e-8, 1e-4])
     slopes = np.transpose([(step(start + e)[0] - step(start - e)[0]) / (2 * e.sum()) for e in np.diag(sizes)])
     expected = slopes @ before @ slopes.T
     expected[1, 1] += PERIOD * bristle_filter.SPEED_NOISE
-    expected[3, 3] += PERIOD * bristle_filter.PUSH_NOISE
+    expected[3, 3] += PERIOD * PUSH_NOISE
     scale = np.sqrt(np.diag(expected))
     # The filter leaves out how the level of friction changes with speed, and how the relaxation does within a period.
     upper = np.triu_indices(4)
@@ -96,12 +108,34 @@ def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
 def test_a_piston_without_friction_is_followed():
     p = Rig(parameter_column(RIG.replace({"cylinder2.coulomb_friction": 0.0})))
     b = Bristled(np.zeros((Bristled.size, 1)))
-    bristle_filter.begin(b, 1, 0, 0.0, 0.0, NOISE, p)
+    bristle_filter.begin(b, 1, 0, 0.0, 0.0, 0.0, NOISE, p)
     position, speed = 0.0, 0.0
     for k in range(500):
         speed += PERIOD * (6.0 - VISCOUS * speed) / MASS
         position += PERIOD * speed
-        bristle_filter.predict(b, 1, 0, 0.0, 0.0, 1.0 / MASS, p, PERIOD)
+        bristle_filter.predict(b, 1, 0, 0.0, 0.0, 1.0 / MASS, PUSH_NOISE, p, PERIOD)
         if k % 4 == 0:
             bristle_filter.correct(b, 1, 0, position - b.position[1, 0], NOISE)
     assert b.push[1, 0] == pytest.approx(6.0, abs=0.3)
+
+
+@pytest.mark.parametrize("speed", [0.003, -0.2])
+def test_a_force_and_a_speed_correct_as_a_kalman_filter_asks_for(speed):
+    """x + K r and (1 - K h) P with K = P h/(h P h + noise^2); h of f less friction from the friction model's derivatives."""
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((4, 4)) * np.array([1e-4, 1e-2, 3e-5, 2.0])[:, None]
+    before, start = root @ root.T, np.array([0.01, speed, 1e-4 * np.sign(speed), 5.0])
+    level = COULOMB * (1.0 + (RIG.friction.static_ratio - 1.0) / (1.0 + (speed / STRIBECK) ** 2))
+    _, v, z, f = start
+    drag = S0 * z + S1 * (v - S0 * abs(v) * z / level) + VISCOUS * v
+    by_speed, by_bristle = VISCOUS + S1 * (1.0 - S0 * abs(z) / level), S0 - S1 * S0 * abs(v) / level
+    of_force, of_speed = np.array([0.0, -by_speed, -by_bristle, 1.0]), np.array([0.0, 1.0, 0.0, 0.0])
+    weighed, gauged = believed(start, before), believed(start, before)
+    bristle_filter.weigh(weighed, 1, 0, f - drag + 0.7, 0.3, P)
+    bristle_filter.gauge(gauged, 1, 0, v - 0.002, 0.003)
+    assert bristle_filter.drag(believed(start, before), 1, 0, P) == pytest.approx(drag)
+    for b, h, off, noise in ((weighed, of_force, 0.7, 0.3), (gauged, of_speed, -0.002, 0.003)):
+        gain = before @ h / (h @ before @ h + noise**2)
+        state, covariance = read(b)
+        np.testing.assert_allclose(state, start + gain * off)
+        np.testing.assert_allclose(covariance, np.triu(before - np.outer(gain, h @ before)), rtol=1e-6, atol=1e-15)

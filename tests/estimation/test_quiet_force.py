@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from baselines.estimation import quiet_force
-from baselines.estimation.quiet_force import Quiet
+from baselines.estimation.hand import quiet_force
+from baselines.estimation.hand.quiet_force import Quiet
 
 PERIOD = 1e-3
 

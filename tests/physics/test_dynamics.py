@@ -104,7 +104,7 @@ def test_a_step_is_the_classical_runge_kuttas_in_every_lane() -> None:
 @pytest.mark.parametrize("cylinder", [0, 1])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_an_impact_is_the_largest_speed_outward_past_the_stroke(cylinder: int, side: float) -> None:
-    rig = Parameters()
+    rig = Parameters().replace({"cylinder1.stroke": 0.15, "cylinder2.stroke": 0.15})
     plant = Plant(rig, 4)
     position, speed = ((at.Y1, at.V1), (at.Y2, at.V2))[cylinder]
     half = (rig.cylinder1.stroke / 2, rig.cylinder2.stroke / 2)[cylinder]

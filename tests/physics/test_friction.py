@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -93,9 +93,11 @@ def test_bristle_stays_bounded_by_the_breakaway_deflection(law: str) -> None:
 
 
 @given(v=st.floats(-5, 5), cylinder=st.sampled_from([0, 1]))
+@example(v=0.0, cylinder=0)
 def test_steady_friction_takes_energy_at_every_speed(v: float, cylinder: int) -> None:
     level = friction.stribeck_level(v, FC[cylinder], FS[cylinder], VS)
     z = friction.steady_deflection(v, level, S0)
+    assert z == pytest.approx(math.copysign(stribeck(v, cylinder) / S0, v) if v else 0.0)
     lugre = friction.lugre_force(v, z, friction.bristle_rate(v, z, level, S0), S0, S1, FV)
     coulomb = friction.coulomb_force(v, FC[cylinder], FV, 1 / 0.002)
     least = FV * v * v

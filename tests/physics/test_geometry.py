@@ -1,6 +1,7 @@
 """Geometry (1), (2), (16), (17): closed formulas against points in the plane."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -74,12 +75,16 @@ def test_jacobian_and_joint_forces_are_those_of_points(rig: Parameters) -> None:
     np.testing.assert_allclose(geometry.joint_force(force, piston, rig), expected, rtol=0, atol=1e-10)
 
 
-def test_edges_of_the_workspace_are_named_rightly_and_reached() -> None:
+def test_edges_of_the_workspace_are_named_rightly_and_reached_and_no_more() -> None:
     rig = Parameters()
     corner = rigid_body.pose_of(np.array([[-0.1, 0.1], [0.2, 0.2]]), rig).end_effector
     highest, lowest = np.arctan2(corner[1], corner[0])
     assert f"{lowest:.4g} to {highest:.4g} rad above x" in geometry.workspace(rig)
     np.testing.assert_allclose(geometry.inverse_geometry(corner, rig), [[-0.1, 0.1], [0.2, 0.2]], atol=1e-12)
+    for past in ([-0.1001, 0.0], [0.1001, 0.0], [0.0, -0.2001], [0.0, 0.2001]):
+        (_, x), (_, y) = places = rigid_body.pose_of(np.array([[0.0, 0.0], past]).T, rig).end_effector
+        with pytest.raises(ValueError, match=re.escape(f"position = ({x:.6g}, {y:.6g}) m is unreachable")):
+            geometry.inverse_geometry(places, rig)
 
 
 @each_rig

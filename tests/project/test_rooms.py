@@ -79,10 +79,8 @@ def test_rows_by_number_are_found():
     assert not list(rows_by_number(f"def k(x):\n  {body}"))
 
 
-GIVEN = {"baselines/estimation/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)}}
+GIVEN = {"baselines/estimation/hand/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)}}
 """Arguments that are one named group of whoever calls, x and y."""
-GIVEN["studies/sensorless/told.py"] = {"head[0]", "head[1]"}
-"""A function's address and a size before numbers that are no rows."""
 
 
 def test_kernels_name_their_rows():

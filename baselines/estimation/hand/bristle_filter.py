@@ -2,8 +2,9 @@
 
     y' = v,   v' = w (L + f - Fv v - s0 z - s1 z') + a0,   z' = v - s0 |v| z/G(v),   f' = noise
 with the chambers' force L known from pressures, the answer w to a force and the acceleration a0 without one. Friction is
-LuGre's. Position samples correct all four. A resting piston reveals f by its bristles, 20 um for 1 N, hence slowly; a sliding
-one by its acceleration. LuGre on an observed speed creeps under its noise; here the model alone moves the bristles at rest.
+LuGre's. Position samples correct all four, and so do forces and speeds where an acceleration sensor tells them. A resting
+piston reveals f by its bristles, 20 um for 1 N, hence slowly; a sliding one by its acceleration. LuGre on an observed speed
+creeps under its noise; here the model alone moves the bristles at rest.
 """
 
 from birthsim_env.physics import friction
@@ -11,15 +12,21 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 
-PUSH_NOISE, SPEED_NOISE = 3.0, 1e-6
-"""N2/s and m2/s3: densities of the noise that drives f and v; found by trial. At rest f is then averaged over 0.2 s."""
+SPEED_NOISE = 1e-6
+"""m2/s3: density of the noise that drives v; found by trial."""
 
 ALERT, EXPECTED, SHARE = 100.0, 2.0, 0.1
 """Samples that are further off than their noise explains make f noisier: by ``ALERT`` times what their squared innovations,
 averaged with the weight ``SHARE`` and in units of their variance, exceed ``EXPECTED``. Found by trial."""
 
+FORCE_ALERT, FORCE_EXPECTED, FORCE_SHARE = 300.0, 0.3, 0.1
+"""The same where a force is measured, by its innovations; found by trial. At rest their average is 0.02 to 0.14."""
+
 MOST_SURPRISE = 25.0
 """assumed: no squared innovation counts for more, in units of its variance."""
+
+SLIDES = 5e-3
+"""m/s; found by trial: a faster piston counts as sliding."""
 
 FIRST_PUSH, FIRST_BRISTLE = 1.0, 2.0
 """N; assumed: standard deviations of f and of s0 z at a start."""
@@ -46,6 +53,7 @@ class Bristled(Rows):
     zz = rows("zz1 zz2", "m2", "covariance")
     zf = rows("zf1 zf2", "N m", "covariance")
     ff = rows("ff1 ff2", "N2", "covariance")
+    stirred = rows("s1 s2", "1", "squared innovations of the force over their variance, averaged")
     surprise = rows("e1 e2", "1", "squared innovations over their variance, averaged")
 
 
@@ -63,9 +71,13 @@ def _way(speed: float) -> float:
 
 
 @helper
-def begin(b: Bristled, k: int, i: int, position: float, push: float, noise: float, p: Rig) -> None:
-    """Starts piston ``k`` of lane ``i`` at rest at a measured ``position``."""
-    b.position[k, i], b.speed[k, i], b.bristle[k, i], b.push[k, i] = position, 0.0, 0.0, push
+def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: float, noise: float, p: Rig) -> None:
+    """Starts piston ``k`` of lane ``i`` at a measured ``position`` with a ``speed``, where friction and ``push``, N, balance
+    the rest."""
+    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
+    b.position[k, i], b.speed[k, i] = position, speed
+    b.bristle[k, i] = _slack(speed, coulomb, static, p) * speed / (abs(speed) + SLIDES)
+    b.push[k, i] = push + p.s0 * b.bristle[k, i]
     b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i] = noise * noise, 0.0, 0.0, 0.0
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = 0.0, 0.0, 0.0
     bent = min(FIRST_BRISTLE, p.fc1 if k == 0 else p.fc2) / p.s0
@@ -74,9 +86,11 @@ def begin(b: Bristled, k: int, i: int, position: float, push: float, noise: floa
 
 
 @helper
-def predict(b: Bristled, k: int, i: int, load: float, own: float, answer: float, p: Rig, period: float) -> None:
+def predict(
+    b: Bristled, k: int, i: int, load: float, own: float, answer: float, push_noise: float, p: Rig, period: float
+) -> None:
     """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
-    forces; ``answer``, 1/kg, to a force."""
+    forces; ``answer``, 1/kg, to a force; ``push_noise``, N2/s, that drives f."""
     coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
     viscous = p.fv1 if k == 0 else p.fv2
     most = max(static, LEAST_FRICTION) / p.s0
@@ -106,32 +120,79 @@ def predict(b: Bristled, k: int, i: int, load: float, own: float, answer: float,
         bv * avv + bz * avz + bf * avf,
         bv * bvv + bz * bvz + bf * bvf,
     )
+    alert = ALERT * max(0.0, b.surprise[k, i] - EXPECTED) + FORCE_ALERT * max(0.0, b.stirred[k, i] - FORCE_EXPECTED)
     b.yy[k, i] += period * (2.0 * ay + period * vv)
     b.yv[k, i], b.yz[k, i], b.yf[k, i] = ay + period * vv, by + period * vz, yf + period * avf
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = vv, vz, avf
     b.zz[k, i], b.zf[k, i], b.ff[k, i] = (
         zz,
         bvf,
-        ff + period * PUSH_NOISE * (1.0 + ALERT * max(0.0, b.surprise[k, i] - EXPECTED)),
+        ff + period * push_noise * (1.0 + alert),
     )
+
+
+@helper
+def _take(b: Bristled, k: int, i: int, y: float, v: float, z: float, f: float, variance: float, innovation: float) -> float:
+    """Corrects piston ``k`` of lane ``i`` by a measurement, whose covariances with the state are ``y``, ``v``, ``z`` and ``f``;
+    the squared innovation over its variance."""
+    weight = 1.0 / variance
+    e = weight * innovation
+    b.position[k, i] += y * e
+    b.speed[k, i] += v * e
+    b.bristle[k, i] += z * e
+    b.push[k, i] += f * e
+    b.yy[k, i] -= y * y * weight
+    b.yv[k, i] -= y * v * weight
+    b.yz[k, i] -= y * z * weight
+    b.yf[k, i] -= y * f * weight
+    b.vv[k, i] -= v * v * weight
+    b.vz[k, i] -= v * z * weight
+    b.vf[k, i] -= v * f * weight
+    b.zz[k, i] -= z * z * weight
+    b.zf[k, i] -= z * f * weight
+    b.ff[k, i] -= f * f * weight
+    return min(e * innovation, MOST_SURPRISE)
 
 
 @helper
 def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> None:
     """Takes a position sample of piston ``k`` of lane ``i``: what it is off, m, and its standard deviation, m."""
     yy, yv, yz, yf = b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i]
-    weight = 1.0 / (yy + noise * noise)
-    e = weight * innovation
-    b.surprise[k, i] += SHARE * (min(e * innovation, MOST_SURPRISE) - b.surprise[k, i])
-    b.position[k, i] += yy * e
-    b.speed[k, i] += yv * e
-    b.bristle[k, i] += yz * e
-    b.push[k, i] += yf * e
-    b.yy[k, i], b.yv[k, i] = yy - yy * yy * weight, yv - yy * yv * weight
-    b.yz[k, i], b.yf[k, i] = yz - yy * yz * weight, yf - yy * yf * weight
-    b.vv[k, i] -= yv * yv * weight
-    b.vz[k, i] -= yv * yz * weight
-    b.vf[k, i] -= yv * yf * weight
-    b.zz[k, i] -= yz * yz * weight
-    b.zf[k, i] -= yz * yf * weight
-    b.ff[k, i] -= yf * yf * weight
+    found = _take(b, k, i, yy, yv, yz, yf, yy + noise * noise, innovation)
+    b.surprise[k, i] += SHARE * (found - b.surprise[k, i])
+
+
+@helper
+def gauge(b: Bristled, k: int, i: int, speed: float, noise: float) -> None:
+    """Takes a ``speed`` of piston ``k`` of lane ``i``, m/s, and its standard deviation, m/s."""
+    yv, vv, vz, vf = b.yv[k, i], b.vv[k, i], b.vz[k, i], b.vf[k, i]
+    _take(b, k, i, yv, vv, vz, vf, vv + noise * noise, speed - b.speed[k, i])
+
+
+@helper
+def drag(b: Bristled, k: int, i: int, p: Rig) -> float:
+    """Friction of piston ``k`` of lane ``i`` as believed, N."""
+    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
+    v, z = b.speed[k, i], b.bristle[k, i]
+    bends = 1.0 - _way(v) * z / _slack(v, coulomb, static, p)
+    found: float = ((p.fv1 if k == 0 else p.fv2) + p.s1 * bends) * v + p.s0 * z
+    return found
+
+
+@helper
+def weigh(b: Bristled, k: int, i: int, unexplained: float, noise: float, p: Rig) -> None:
+    """Takes what acceleration, weight and chambers leave unexplained of piston ``k`` of lane ``i``, N, f less friction, and
+    its standard deviation, N."""
+    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
+    v, z = b.speed[k, i], b.bristle[k, i]
+    slack = _slack(v, coulomb, static, p)
+    # Derivatives of f less friction, to v and z.
+    to_v = -((p.fv1 if k == 0 else p.fv2) + p.s1 * (1.0 - _way(v) * z / slack))
+    to_z = -(p.s0 - p.s1 * abs(v) / slack)
+    yh = to_v * b.yv[k, i] + to_z * b.yz[k, i] + b.yf[k, i]
+    vh = to_v * b.vv[k, i] + to_z * b.vz[k, i] + b.vf[k, i]
+    zh = to_v * b.vz[k, i] + to_z * b.zz[k, i] + b.zf[k, i]
+    fh = to_v * b.vf[k, i] + to_z * b.zf[k, i] + b.ff[k, i]
+    off = unexplained - (b.push[k, i] - drag(b, k, i, p))
+    found = _take(b, k, i, yh, vh, zh, fh, to_v * vh + to_z * zh + fh + noise * noise, off)
+    b.stirred[k, i] += FORCE_SHARE * (found - b.stirred[k, i])

@@ -10,7 +10,7 @@ mass and of the pressure cells.
 
 import math
 
-from baselines.estimation import force_bias
+from baselines.estimation.hand import force_bias
 from birthsim_env.loop.signals import Joints, PerPiston
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper

@@ -12,9 +12,9 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 
 QUICK, SLOW = 20.0, 3.0
-"""1/s, of the low-passes on which a rest is judged; assumed. At rest they have a noise of 1.4 and 0.7 N."""
+"""1/s, of the low-passes on which a rest is judged; assumed."""
 
-STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 3.5
+STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 2.5
 """N; found by trial. Larger limits miss small pushes, smaller ones let noise end a rest."""
 
 SETTLES = 0.9

@@ -7,7 +7,7 @@ way to it late would swing for ever.
 
 import math
 
-from baselines.estimation.half_wave import HalfWave, sustained
+from baselines.estimation.hand.half_wave import HalfWave, sustained
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array

@@ -6,10 +6,10 @@ What is left at the start, before a hand comes, is taken for an error of the mas
 
 import math
 
-from baselines.estimation import bristle_filter, force_bias, quiet_force
-from baselines.estimation.bristle_filter import Bristled
-from baselines.estimation.force_observer import MOST_BIAS, Hand
-from baselines.estimation.quiet_force import Quiet
+from baselines.estimation.hand import bristle_filter, force_bias, quiet_force
+from baselines.estimation.hand.bristle_filter import Bristled
+from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
+from baselines.estimation.hand.quiet_force import Quiet
 from baselines.estimation.rows import Belief, Pistons
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
@@ -19,6 +19,9 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, part, row
 from birthsim_env.physics.inverse_kinematics import piston_motion
+
+PUSH_NOISE = 3.0
+"""N2/s: density of the noise that drives the push; found by trial. At rest it is then averaged over 0.2 s."""
 
 
 class Felt(Rows):
@@ -72,10 +75,10 @@ def observe(
         load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
         load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere)
         if fresh[i] > 0.0:
-            bristle_filter.begin(b, 0, i, y1, -load1 - own1 * p.mass * kappa * kappa, noise[i] / kappa, p)
-            bristle_filter.begin(b, 1, i, y2, -load2 - own2 * p.mass, noise[i], p)
-        bristle_filter.predict(b, 0, i, load1, own1, p.inverse_mass / (kappa * kappa), p, period)
-        bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, p, period)
+            bristle_filter.begin(b, 0, i, y1, 0.0, -load1 - own1 * p.mass * kappa * kappa, noise[i] / kappa, p)
+            bristle_filter.begin(b, 1, i, y2, 0.0, -load2 - own2 * p.mass, noise[i], p)
+        bristle_filter.predict(b, 0, i, load1, own1, p.inverse_mass / (kappa * kappa), PUSH_NOISE, p, period)
+        bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, PUSH_NOISE, p, period)
         if sampled > 0.0:
             for axis in range(2):
                 point.position[axis, 0], point.velocity[axis, 0] = seen.position[axis, i], seen.velocity[axis, i]

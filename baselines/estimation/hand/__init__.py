@@ -1,0 +1,1 @@
+"""Estimates of the force of the hand, without a force sensor."""
