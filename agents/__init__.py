@@ -41,4 +41,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+    try:
+        return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+    except ImportError as error:
+        extras = "agents,onnx" if name == "export_onnx" else "agents"
+        raise ImportError(f"{error}; {name} needs pip install 'birthsim[{extras}]'") from error

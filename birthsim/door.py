@@ -48,7 +48,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "explain": Command("agents", "commands.explain", "what a trained residual has learned",
             "explain --policy circle --no-pushes --out out/explain"),
     },
-    "hand on": {
+    "use elsewhere": {
         "export": Command("birthsim", "export", "policies, loops and logs in other forms",
             "export --to wasm --out out/wasm"),
     },

@@ -1,1 +1,1 @@
-"""The closed loop without Python: as WebAssembly, as a shared library for C, and as an object for a microcontroller."""
+"""The closed loop without Python: WebAssembly, a C library, an object for a microcontroller, FMUs, kernels for a GPU."""

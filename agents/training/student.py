@@ -1,4 +1,4 @@
-"""A recurrent student of a privileged teacher: it has no true figures, and does what the teacher does by memory.
+"""A recurrent student imitates a privileged teacher from measurements alone, without the true figures that the teacher sees.
 
 DAgger (Ross, Gordon and Bagnell 2011): the teacher says at every step what it would do, while from the second round on the
 student acts. The student is a gated recurrent unit (GRU), as in RAPTOR (arXiv 2509.11481).

@@ -105,7 +105,7 @@ class Configured:
     """What every command with options has."""
 
     config: Annotated[Path | None, Parameter(metavar="FILE")] = None
-    """TOML file of these options, such as seed = 1; those of the command line override it."""
+    """TOML file of these options, a line "name = value" each; the command line overrides it."""
 
     def shown(self) -> dict[str, Any]:
         """What results depend on, as JSON."""

@@ -29,7 +29,7 @@ def require_assembler() -> str:
 def assemble(ptx: Path, cubin: Path, gpu: str, *options: str) -> dict[str, int]:
     """Write machine code for a ``gpu``, sm_90 for one; returns what a thread of ``birthsim_advance`` takes.
 
-    Bytes of its memory, bytes of it that are registers that did not fit (``spilled``, in all functions), and registers. Raises
+    ``memory``: bytes of its own. ``spilled``: those that hold what did not fit into registers, in all functions. Raises
     ``ValueError`` for a GPU that ``ptxas`` does not know.
     """
     if not GPU.fullmatch(gpu):

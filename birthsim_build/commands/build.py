@@ -1,4 +1,4 @@
-"""birthsim export: closed loops without Python, as WebAssembly, for C, or for a microcontroller."""
+"""birthsim export: closed loops without Python, as WebAssembly, for C, for a microcontroller or for a GPU."""
 
 import platform
 from dataclasses import dataclass, field

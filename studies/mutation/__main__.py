@@ -92,12 +92,14 @@ def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], N
 
 def run_here(item: pytest.Item, seconds: float) -> str | None:
     """Why a test does not pass within so many CPU seconds of this process, or None."""
+    slow = False
 
     def stop(*_: object) -> None:
+        nonlocal slow
+        slow = True
         raise TimeoutError("time limit")
 
     before = signal.signal(signal.SIGPROF, stop)
-    started = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
@@ -105,7 +107,6 @@ def run_here(item: pytest.Item, seconds: float) -> str | None:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
     failed, item.session.testsfailed = item.session.testsfailed, 0
-    slow = time.process_time() - started >= seconds
     return ("time limit" if slow else "fails") if failed else None
 
 
@@ -155,25 +156,25 @@ class Tester:
         return chosen, left_out
 
     def examine(self, module: ModuleType, items: list[pytest.Item]) -> dict[str, Any]:
-        """CPU seconds of the tests and of all mutants; the tests left out; what killed each mutant, None where it survived."""
+        """CPU seconds of the tests and seconds in all; the tests left out; what killed each mutant, None where it survived."""
+        started = time.monotonic()
         chosen, left_out = self.select(module.__name__, items)
         cost, kills = {item.nodeid: self.measured[item.nodeid][1] for item in chosen}, Counter[str | None]()
         control, together = run_in_child(chosen, 2 * self.budget + 5, lambda: None)
         if control:
             raise RuntimeError(f"{module.__name__} without a change: {control}")
         earlier = self.again.get(module.__name__, {})
-        found, total = {"tests": earlier.get("tests", {}) | cost, "left_out": left_out, "every": self.every, "mutants": {}}, 0.0
+        found = {"tests": earlier.get("tests", {}) | cost, "left_out": left_out, "every": self.every, "mutants": {}}
         for mutant in list(mutants_of(module))[:: self.every]:
             chosen.sort(key=lambda item: cost[item.nodeid] / (1 + kills[item.nodeid]))
             known = earlier.get("mutants", {}).get(mutant.name, {})
             if known.get("change") == mutant.change and known["killed_by"] is not None:
                 found["mutants"][mutant.name] = known
                 continue
-            killer, seconds = run_in_child(chosen, PATIENCE * together + 5, mutant.apply)
+            killer, _ = run_in_child(chosen, PATIENCE * together + 5, mutant.apply)
             kills[killer] += 1
-            total += seconds
             found["mutants"][mutant.name] = {"line": mutant.line, "change": mutant.change, "killed_by": killer}
-        return found | {"seconds": total + earlier.get("seconds", 0.0)}
+        return found | {"seconds": time.monotonic() - started + earlier.get("seconds", 0.0)}
 
 
 def print_results(module: str, results: dict[str, Any], before: dict[str, Any]) -> None:

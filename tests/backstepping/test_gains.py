@@ -106,3 +106,5 @@ def test_equal_gains_are_refused_below_the_least_stiffness() -> None:
     for name, wrong in (("stiffness", 0.0), ("apparent_mass", 0.0), ("viscous", -1.0), ("damping", 0.0)):
         with pytest.raises(ValueError, match=rf"{name} = {wrong}; allowed: a .*(positive|>= 0)"):
             gains_for(**(right | {name: wrong}))
+    with pytest.raises(ValueError, match=r"stiffness = 3 N/m; allowed with a damping: more than m_e/s2 = 3 N/m"):
+        gains_for(**(right | {"stiffness": 3.0}))

@@ -84,3 +84,24 @@ def test_running_a_policy_needs_neither_torch_nor_stable_baselines(folder):
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "(4, 2)", done.stderr
+
+
+WITHOUT_EXTRAS = """
+import sys
+sys.modules["safetensors"] = sys.modules["stable_baselines3"] = None
+import agents
+for name in ("SB3VecEnv", "load_policy", "export_onnx"):
+    try:
+        getattr(agents, name)
+    except ImportError as error:
+        print(str(error).rpartition("; ")[2])
+"""
+
+
+def test_a_name_that_needs_an_extra_says_which():
+    done = subprocess.run([sys.executable, "-c", WITHOUT_EXTRAS], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [
+        "SB3VecEnv needs pip install 'birthsim[agents]'",
+        "load_policy needs pip install 'birthsim[agents]'",
+        "export_onnx needs pip install 'birthsim[agents,onnx]'",
+    ]

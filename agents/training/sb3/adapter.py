@@ -26,7 +26,7 @@ class SB3VecEnv(VecEnv):
 
     def __init__(self, env: Any, staggered: bool = False) -> None:
         if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
-            raise ValueError(f"env = {env!r}; allowed: one made with autoreset_mode='SameStep'")
+            raise ValueError(f"env = {env!r}; allowed: of gymnasium.make_vec, one made with autoreset_mode='SameStep'")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.seconds, self.steps = 0.0, 0

@@ -1,9 +1,8 @@
 """Rewards less a constant, for a learner: the same problem with values near zero.
 
-An environment that pays about one per step, so that ending early never pays, has values near 1/(1 - discount), and what one
-action is worth more than another is a small difference of large ones. Less ``by`` per step all values are by/(1 - discount)
-less. So is that of having terminated, which was zero: it is paid at the last step. No policy is worth more or less than
-before relative to another.
+An environment that pays about one per step has values near 1/(1 - discount), and two actions differ by little beside that. A
+reward that is less by ``by`` at every step lowers all values by by/(1 - discount). The value after termination, which was zero,
+has to fall by as much: the last step pays for it. So the order of policies stays as it was.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 
 class ShiftedReward(VecEnvWrapper):
-    """``venv`` with every reward less ``by``, and ``discount`` by/(1 - discount) less where an episode terminates.
+    """``venv`` with ``by`` subtracted from every reward, and another discount by/(1 - discount) where an episode terminates.
 
     ``infos`` stay as they are, returns of episodes too. Raises ``ValueError`` for a discount that is not in [0, 1).
     """
