@@ -16,7 +16,7 @@ CONTROLLERS = {
     "pid": "A position controller on the motion that the spring would make: what most would try first.",
     "lqr": "A linear regulator on the motion that the spring would make; its gains weigh error against effort.",
     "sliding-mode": "A sliding-mode controller on the motion that the spring would make.",
-    "nonlinear-mpc": "Plans 57 ms ahead at every millisecond: a bound for what computing can do with its model.",
+    "nonlinear-mpc": "Plans 57 ms ahead at every millisecond, with a model of the rig.",
     "shut-valves": "All valves stay shut: the rig is a spring of air.",
     "slammed-valves": "Fully open valves drive both pistons out.",
     "random-valves": "Valves open at random.",

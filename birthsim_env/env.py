@@ -93,7 +93,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Arguments
     - `action_mode`, `valves`: see above.
-    - `sensors`: `"ideal"`; `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures;
+    - `sensors`: `"ideal"`; `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, low-passed differences for
+      a velocity, noisy pressures;
       `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
       (`birthsim_env.physics.electronics`).
     - `force_sensor`: `False` for a rig without one. The measured force of the hand is then zero, and every entry of the

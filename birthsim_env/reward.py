@@ -1,7 +1,7 @@
 """What a policy is paid, from the true state: to stay on the compliant target, calmly and with little effort. What is success.
 
-Every 10 ms pay one, less its costs as a fraction of the largest ones. So no step pays less than nothing, and an episode
-that ends early, after which nothing is paid, is never worth more than one that goes on, whatever the discount.
+Each step of 10 ms pays 1 minus a cost between 0 and 1. An episode that ends early is paid nothing afterwards. So ending early
+is never better than going on, whatever the discount.
 
 Nothing can follow a jump of the hand. After a jump the target of the reward therefore moves to the compliant target with a time
 constant of 60 ms, and the error against it counts as at any other time. A reward that ignored the errors after a jump taught
