@@ -65,8 +65,8 @@ def test_while_pistons_slide_it_is_what_newtons_law_asks_for(v1, v2):
         y = start + speed * time
         load = joint_force(P.mass * (acceleration + np.array([0.0, P.gravity])) - hand, y, RIG)
         lane.see(y, speed, acceleration, pressures_for(load + drag))
-    # The bristles have gone 20 times their deflection; the speed that the filter believes is off by a little.
-    np.testing.assert_allclose(lane.hand.force[:, 0], hand, atol=0.1)
+    # The bristles have gone 20 times their deflection; the speed believed is off by the noise of the one that it is told.
+    np.testing.assert_allclose(lane.hand.force[:, 0], hand, atol=2 * inertial_force.SPEED_SLIDING * viscous.max())
 
 
 def held(course, ticks):

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 
 class ShiftedReward(VecEnvWrapper):
-    """``venv`` with ``by`` subtracted from every reward, and another discount by/(1 - discount) where an episode terminates.
+    """``venv`` with ``by`` subtracted from every reward; where an episode terminates, ``discount * by/(1 - discount)`` more.
 
     ``infos`` stay as they are, returns of episodes too. Raises ``ValueError`` for a discount that is not in [0, 1).
     """
