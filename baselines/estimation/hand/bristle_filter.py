@@ -7,6 +7,8 @@ piston reveals f by its bristles, 20 um for 1 N, hence slowly; a sliding one by 
 creeps under its noise; here the model alone moves the bristles at rest.
 """
 
+import math
+
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
@@ -34,6 +36,10 @@ FIRST_PUSH, FIRST_BRISTLE = 1.0, 2.0
 
 LEAST_FRICTION = 1e-3
 """N; a piston without friction is believed to have this, so that its bristles bend by a distance."""
+
+
+UNKNOWN = 0.1
+"""of the variance of v"""
 
 
 class Bristled(Rows):
@@ -95,15 +101,15 @@ def predict(
     viscous = p.fv1 if k == 0 else p.fv2
     most = max(static, LEAST_FRICTION) / p.s0
     v, z = b.speed[k, i], max(-most, min(most, b.bristle[k, i]))
-    slack = _slack(v, coulomb, static, p)
-    kept = 1.0 / (1.0 + period * abs(v) / slack)
-    bends, relaxes = kept * (1.0 - _way(v) * z / slack), kept * abs(v) / slack
+    slack, fast = _slack(v, coulomb, static, p), math.sqrt(v * v + UNKNOWN * b.vv[k, i])
+    kept = 1.0 / (1.0 + period * fast / slack)
+    bends, relaxes = kept * (1.0 - _way(v) * z / slack), kept * fast / slack
     rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
     step = period * answer
     av, az, af = 1.0 - step * (viscous + p.s1 * bends), -step * (p.s0 - p.s1 * relaxes), step
     v += period * rate
-    slack = _slack(v, coulomb, static, p)
-    kept = 1.0 / (1.0 + period * abs(v) / slack)
+    slack, fast = _slack(v, coulomb, static, p), math.sqrt(v * v + UNKNOWN * b.vv[k, i])
+    kept = 1.0 / (1.0 + period * fast / slack)
     z = kept * (z + period * v)
     bend = period * kept * (1.0 - _way(v) * z / slack)
     bv, bz, bf = bend * av, kept + bend * az, bend * af

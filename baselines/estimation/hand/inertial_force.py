@@ -36,7 +36,7 @@ SPEED_AT_REST, SPEED_SLIDING = 3e-3, 3e-5
 """m/s: standard deviations of a speed that ``inertial`` finds, found by trial. Its errors of 0.24 mm/s last for 0.1 s, in which
 a resting piston's bristles would gather them. Those of a sliding one forget them."""
 
-LATE = 0.01
+LATE = 0.002
 """s; found by trial: a moving head is off by so much times its speed, as a tracker is later than believed."""
 
 
