@@ -32,7 +32,7 @@ PUSH_NOISE, WEIGHED = 0.3, 0.15
 """N2/s and m/s2: density of the noise that drives the hand's force, until innovations tell of more, and standard deviation of
 an acceleration; found by trial. The sensor's low-pass and the model of the pressures count as noise, too."""
 
-SPEED_AT_REST, SPEED_SLIDING = 3e-3, 3e-5
+SPEED_AT_REST, SPEED_SLIDING = 5e-3, 3e-5
 """m/s: standard deviations of a speed that ``inertial`` finds, found by trial. Its errors of 0.24 mm/s last for 0.1 s, in which
 a resting piston's bristles would gather them. Those of a sliding one forget them."""
 
