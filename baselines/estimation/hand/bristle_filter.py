@@ -38,7 +38,7 @@ LEAST_FRICTION = 1e-3
 """N; a piston without friction is believed to have this, so that its bristles bend by a distance."""
 
 
-UNKNOWN = 0.1
+UNKNOWN = 0.07
 """of the variance of v"""
 
 
