@@ -6,12 +6,12 @@ What is left at the start, before a hand comes, is taken for an error of the mas
 
 import math
 
-from baselines.estimation.hand import bristle_filter, force_bias, quiet_force
+from baselines.estimation.hand import force_bias, quiet_force
 from baselines.estimation.hand.bristle_filter import Bristled
-from baselines.estimation.hand.bristled_pistons import carry
+from baselines.estimation.hand.bristled_pistons import carry, see
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
 from baselines.estimation.hand.quiet_force import Quiet
-from baselines.estimation.rows import Belief, Pistons
+from baselines.estimation.rows import Belief
 from birthsim_env.loop.rows import POSITION, Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.loop.stage import scratch
@@ -34,31 +34,17 @@ class Felt(Rows):
 
 
 @helper
-def _since(pistons: Pistons, k: int, i: int, joints: Joints, periods: float) -> float:
-    """How far piston ``k`` of lane ``i`` has moved in the last ``periods``, by its observer, m; 0 where speeds are measured."""
-    past, slot = pistons.past, int(pistons.slot[i])
-    depth = past.shape[0] // 2
-    if depth == 0:
-        return 0.0
-    back = min(int(periods), depth - 2)
-    newer, older = past[2 * ((slot - back) % depth) + k, i], past[2 * ((slot - back - 1) % depth) + k, i]
-    moved: float = joints.position[k, i] - (newer + min(periods - back, 1.0) * (older - newer))
-    return moved
-
-
-@helper
 def observe(
     hand: Hand,
     felt: Felt,
     seen: Signals,
-    pistons: Pistons,
     joints: Joints,
     pressures: Array,
     noise: Array,
     about: Belief,
     fresh: Array,
 ) -> None:
-    """Carries ``hand`` and ``felt`` on by one period, at whose end ``pistons`` are observed and pressures (4, N), Pa, known.
+    """Carries ``hand`` and ``felt`` on by one period, at whose end ``joints`` and pressures (4, N), Pa, are known.
 
     ``noise`` (N,), m, is that of a position sample.
     """
@@ -74,10 +60,7 @@ def observe(
         felt.newest[i] = seen.position_time[i]
         carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, 0.0, p, period, fresh[i] > 0.0)
         if sampled > 0.0:
-            for k in range(2):
-                since = _since(pistons, k, i, joints, (seen.time[i] - seen.position_time[i]) / period)
-                off = sample.position[k, i] - (b.position[k, i] - since)
-                bristle_filter.correct(b, k, i, off, noise[i] / kappa if k == 0 else noise[i])
+            see(b, i, sample, joints, kappa, seen.time[i] - seen.position_time[i], noise[i])
         across, along = -b.push[0, i] / kappa, b.push[1, i]
         hand.filtered[0, i], hand.filtered[1, i] = across * cosine + along * sine, across * sine - along * cosine
     bare = scratch(2)[:, : fresh.shape[0]]

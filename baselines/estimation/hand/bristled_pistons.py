@@ -1,4 +1,4 @@
-"""Both pistons of a rig under ``bristle_filter``, with what acts on them that is known: chambers, weight and the turning lever."""
+"""Both pistons of a rig under ``bristle_filter``, with what is known to act on them: chambers, weight and the turning lever."""
 
 from baselines.estimation.hand import bristle_filter
 from baselines.estimation.hand.bristle_filter import Bristled
@@ -7,11 +7,14 @@ from birthsim_env.physics import mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
 
+LATE = 0.002
+"""s; found by trial: a moving head is off by so much times its speed, as ``identify`` leaves 0.5 to 1 ms of a latency."""
+
 
 @helper
 def carry(
-    b: Bristled, i: int, joints: Joints, air: PerChamber, pose: tuple[float, ...], noise: float, push_noise: float, unseen: float, p: Rig,
-    period: float, new: bool,
+    b: Bristled, i: int, joints: Joints, air: PerChamber, pose: tuple[float, ...], noise: float, push_noise: float,
+    unseen: float, p: Rig, period: float, new: bool,
 ) -> tuple[float, float]:  # fmt: skip
     """Carries both pistons of lane ``i`` on by a period, or starts them where ``joints`` are; forces of the chambers, N.
 
@@ -29,3 +32,11 @@ def carry(
     bristle_filter.predict(b, 0, i, load1, own1, p.inverse_mass / (kappa * kappa), push_noise, unseen, p, period)
     bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, push_noise, unseen, p, period)
     return load1, load2
+
+
+@helper
+def see(b: Bristled, i: int, sample: Joints, joints: Joints, kappa: float, age: float, noise: float) -> None:
+    """Takes a position ``sample`` of both pistons of lane ``i`` that is ``age`` s old and has ``noise``, m, along piston 2."""
+    for k in range(2):
+        v, spread = joints.speed[k, i], noise / kappa if k == 0 else noise
+        bristle_filter.correct(b, k, i, sample.position[k, i] - (b.position[k, i] - v * age), spread + LATE * abs(v))

@@ -13,7 +13,7 @@ import math
 from baselines.estimation.hand import bristle_filter, force_bias, held_force
 from baselines.estimation.hand.bristle_filter import SLIDES
 from baselines.estimation.hand.bristle_observer import Felt
-from baselines.estimation.hand.bristled_pistons import carry
+from baselines.estimation.hand.bristled_pistons import carry, see
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
 from baselines.estimation.hand.held_force import Hold
 from baselines.estimation.inertial import Moving
@@ -41,9 +41,6 @@ UNSEEN = 0.1
 """Part of the variance of a piston's speed that is motion: valves shake a resting piston by 0.1 to 0.3 mm/s, of which 0.07 mm/s
 are not seen, a third of what the filter believes. Found by trial; with 0 bristles were believed 0.3 N too bent after a stop."""
 
-LATE = 0.002
-"""s; found by trial: a moving head is off by so much times its speed, as ``identify`` leaves 0.5 to 1 ms of a latency."""
-
 
 @helper
 def observe(
@@ -61,7 +58,7 @@ def observe(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         kappa, sine, cosine = pose[5:]
-        age, sampled = seen.time[i] - seen.position_time[i], seen.position_time[i] - felt.newest[i]
+        sampled = seen.position_time[i] - felt.newest[i]
         felt.newest[i] = seen.position_time[i]
         load1, load2 = carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, UNSEEN, p, period, fresh[i] > 0.0)
         ax, ay = moving.acceleration[0, i], moving.acceleration[1, i] + p.gravity
@@ -73,9 +70,7 @@ def observe(
         bristle_filter.weigh(b, 0, i, left1, kappa * WEIGHED * p.mass, p)
         bristle_filter.weigh(b, 1, i, left2, WEIGHED * p.mass, p)
         if sampled > 0.0:
-            for k in range(2):
-                v, spread = joints.speed[k, i], noise[i] / kappa if k == 0 else noise[i]
-                bristle_filter.correct(b, k, i, sample.position[k, i] - (b.position[k, i] - v * age), spread + LATE * abs(v))
+            see(b, i, sample, joints, kappa, seen.time[i] - seen.position_time[i], noise[i])
         across = -(left1 + bristle_filter.drag(b, 0, i, p)) / kappa
         along = left2 + bristle_filter.drag(b, 1, i, p)
         x, y = across * cosine + along * sine, across * sine - along * cosine
