@@ -108,7 +108,7 @@ def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
 def test_a_speed_that_is_not_known_wears_bristles_down():
     """z' = v - |v| z/slack: over speeds that are normally distributed about 0, by the mean of |v|, sqrt(2/pi) deviations."""
     deviation, bent, slack = 2e-4, 5.0 / S0, COULOMB * RIG.friction.static_ratio / S0
-    # Chambers balance the bristles, so that the piston stays where it is; speed and bristles are known to go together in nothing.
+    # Chambers balance the bristles, so that the piston stays where it is; nothing is known to go together.
     b = believed([0.0, 0.0, bent, 0.0], np.diag([0.0, deviation**2, 0.0, 0.0]))
     bristle_filter.predict(b, 1, 0, S0 * bent, 0.0, 1.0 / MASS, PUSH_NOISE, 1.0, P, PERIOD)
     speeds = deviation * np.random.default_rng(5).standard_normal(100_000)

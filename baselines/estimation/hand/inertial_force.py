@@ -57,7 +57,7 @@ def observe(
         pose = geometry.pose(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
-        kappa, sine, cosine = pose[5:]
+        _, _, _, _, _, kappa, sine, cosine = pose
         sampled = seen.position_time[i] - felt.newest[i]
         felt.newest[i] = seen.position_time[i]
         load1, load2 = carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, UNSEEN, p, period, fresh[i] > 0.0)
