@@ -42,8 +42,8 @@ RIGS = {
     "ideal": ("ideal", None), "honest": ("honest", None), "honest, acceleration": ("honest", ACCELERATION),
     KNOWN: ("honest", ACCELERATION),
 }  # fmt: skip
-"""Sensors by their name in the table -> sensor model, and the rig's file, which controllers believe; with ``KNOWN`` they are told
-each rig that is drawn, as after ``birthsim identify``."""
+"""Sensors by their name in the table -> sensor model, and the file of the rig that controllers believe. With ``KNOWN`` they are
+told each rig that is drawn, as after ``birthsim identify``."""
 
 MEASURED = (
     ("backstepping", "honest"), ("admittance-adaptive", "ideal"), ("admittance-adaptive", "honest"),

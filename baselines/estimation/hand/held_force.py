@@ -11,7 +11,7 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 
-QUICK, SLOW = 20.0, 3.0
+QUICK, SLOW = 10.0, 3.0
 """1/s, of the low-passes on which a rest is judged; assumed."""
 
 STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 2.5
