@@ -15,6 +15,9 @@ ABOUT = {
 }  # fmt: skip
 """Extra -> what it is for."""
 
+INSTEAD = {"cupy-cuda12x": ("cupy-cuda13x", "cupy"), "nvidia-cuda-nvcc-cu12": ("nvidia-cuda-nvcc",)}
+"""Distribution of an extra -> those that do as well."""
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "chromium-headless-shell")
 
 
@@ -58,7 +61,7 @@ def extras() -> dict[str, list[str]]:
     for line in requires("birthsim") or []:
         extra = re.search(r"extra == '(\w+)'", line)
         name = re.split(r"[^\w.-]", line, maxsplit=1)[0]
-        if extra and extra[1] in needed and found(name) is None:
+        if extra and extra[1] in needed and not any(map(found, (name, *INSTEAD.get(name, ())))):
             needed[extra[1]].append(name)
     return needed
 

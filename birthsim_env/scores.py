@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.physics.rig.values import shown
 
 FILE = Path(__file__).with_name("scores.json")
 
@@ -47,7 +48,7 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     names = {environment_id(scenario, kind): scenario for scenario in SCENARIOS for kind in ("", "Residual")}
     if not isinstance(environment, str) or environment not in names:
         allowed = ", ".join(environment_id(scenario) for scenario in SCENARIOS)
-        raise ValueError(f"environment = {environment!r}; allowed: {allowed}, and their siblings with a law inside")
+        raise ValueError(f"environment = {environment!r}; allowed: {allowed}, and the same with Residual before -v")
     one_of("sensors", sensors, SENSORS)
     one_of("randomize", randomize, tuple(RIGS))
     return _scores()[names[environment].capitalize()][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
@@ -59,6 +60,8 @@ def normalized_score(
     """An episode's return, undiscounted, or an array of them, on a scale where shut valves have 0 and the best classical law
     has 100; see ``reference_scores`` for the arguments."""
     known = reference_scores(environment, sensors, randomize)
+    if np.asarray(score).dtype.kind not in "iuf":
+        raise ValueError(f"score = {shown(score)}; allowed: a number or an array of numbers")
     nothing, best = known[SHUT]["return"], known[BEST]["return"]
     scaled = 100.0 * (np.asarray(score, dtype=np.float64) - nothing) / (best - nothing)
     return scaled if scaled.ndim else float(scaled)

@@ -108,15 +108,15 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     fresh, belief, joints = memory.fresh, about.belief, memory.joints
     if about.friction_rate > 0.0:
         friction_level.learn(memory.friction, known.drag, joints, known.unexplained, about.friction_rate, belief, fresh)
+    pressures, noise, hand, felt = memory.chambers.pressure, known.given.noise, memory.hand, memory.felt
     if about.weighed > 0.0:
-        place, pressures, noise = int(about.place), memory.chambers.pressure, known.given.noise
-        moving, hand, felt = Moving(seen.rows[place : place + Moving.size]), memory.hand, memory.felt
+        place = int(about.place)
+        moving = Moving(seen.rows[place : place + Moving.size])
         inertial_force.observe(hand, felt, memory.hold, seen, moving, joints, pressures, noise, belief, fresh)
     elif about.identified > 0.0:
-        pressures, noise = memory.chambers.pressure, known.given.noise
-        bristle_observer.observe(memory.hand, memory.felt, seen, memory.pistons, joints, pressures, noise, belief, fresh)
+        bristle_observer.observe(hand, felt, seen, joints, pressures, noise, belief, fresh)
     elif about.force_sensor == 0.0:
-        force_observer.observe(memory.hand, seen.time, joints, known.unexplained, belief.rig, belief.period, fresh)
+        force_observer.observe(hand, seen.time, joints, known.unexplained, belief.rig, belief.period, fresh)
 
 
 @helper

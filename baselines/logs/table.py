@@ -89,6 +89,8 @@ def _row(source: str, number: int, line: list[str], names: list[str]) -> list[fl
 
 
 def _check_names(source: str, names: list[str]) -> None:
+    if len(names) == 1 and ";" in names[0]:
+        raise ValueError(f"{source} has one column, {shown(names[0])}; allowed: columns separated by commas")
     if len(set(names)) < len(names):
         twice = next(name for name, count in Counter(names).items() if count > 1)
         raise ValueError(f"{source} has two columns {twice!r}; allowed: one of each name")

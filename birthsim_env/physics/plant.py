@@ -163,7 +163,7 @@ class Plant:
         return self._openings(opening_command), self._force_samples(user_force), float(duration)
 
     def _openings(self, opening_command: ArrayLike) -> Array:
-        command = checked("opening_command", opening_command, (4, self.num_envs), "1")
+        command = checked("opening_command", opening_command, (4, self.num_envs), "parts of full opening")
         if np.abs(command).max() > 1:
             raise ValueError(f"opening_command reaches {np.abs(command).max():g}; allowed: -1 to 1")
         return command

@@ -20,6 +20,7 @@ from studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
 from studies.haptics.multisine import FADE, sines, unit_multisine
 from studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
 from studies.results import Content
+from studies.sensorless.own_logs import Informed
 from studies.study import Found, Options, Study
 from studies.tables import markdown, uses_force
 
@@ -36,12 +37,18 @@ CHUNK = 1000
 """Control periods whose positions are kept at once."""
 
 ACCELERATION = "examples/acceleration_sensor_rig.toml"
-RIGS = {"ideal": ("ideal", None), "honest": ("honest", None), "honest, acceleration": ("honest", ACCELERATION)}
-"""Sensors by their name in the table -> sensor model, and the rig's file."""
+KNOWN = "honest, acceleration, rig known"
+RIGS = {
+    "ideal": ("ideal", None), "honest": ("honest", None), "honest, acceleration": ("honest", ACCELERATION),
+    KNOWN: ("honest", ACCELERATION),
+}  # fmt: skip
+"""Sensors by their name in the table -> sensor model, and the file of the rig that controllers believe. With ``KNOWN`` they are
+told each rig that is drawn, as after ``birthsim identify``."""
 
 MEASURED = (
     ("backstepping", "honest"), ("admittance-adaptive", "ideal"), ("admittance-adaptive", "honest"),
-    ("admittance-adaptive", "honest, acceleration"), ("admittance-sensorless", "honest, acceleration"),
+    ("admittance-adaptive", "honest, acceleration"), ("admittance-adaptive", KNOWN),
+    ("admittance-sensorless", "honest, acceleration"), ("admittance-sensorless", KNOWN),
 )  # fmt: skip
 """Controllers, and the sensors of ``RIGS`` that they have."""
 
@@ -104,10 +111,15 @@ def _cases(condition: Condition) -> tuple[list[Parameters], Array, Reference]:
     return each, np.transpose(directions), resting(poses, [STIFFNESS] * len(cases))
 
 
-def measure(peak: float, **settings: Any) -> Result:
-    """Bandwidth, and up to where 1 JND holds, Hz, under pushes of ``peak`` N at most: over directions and rigs, (2, R) each."""
+def measure(peak: float, known: bool, **settings: Any) -> Result:
+    """Bandwidth, and up to where 1 JND holds, Hz, under pushes of ``peak`` N at most: over directions and rigs, (2, R) each.
+
+    ``known``: the controller is told each rig that is drawn.
+    """
     condition = condition_of(**settings)
     rigs, direction, reference = _cases(condition)
+    if known:
+        condition = Informed(**vars(condition), told=rigs)
     declared = declared_by(condition.law(), reference)
     if declared is None:
         raise ValueError(f"controller = {condition.controller!r}; allowed: one that declares an impedance")
@@ -145,12 +157,16 @@ def _settings(controller: str, sensors: str, peak: float, options: Options) -> d
     return {**own, "sensors": model, "seed": options.seed, "rigs": options.rigs, "force_sensor": True, "peak": peak}
 
 
+def _measured(controller: str, sensors: str, peak: float, options: Options) -> Task:
+    stem, settings = f"{file_stem(controller)}/{file_stem(sensors)}-{peak:g}", _settings(controller, sensors, peak, options)
+    return Task(stem, measure, {**settings, "known": sensors == KNOWN})
+
+
 def _tasks(options: Options) -> dict[Any, Task]:
     found: dict[Any, Task] = {}
     for peak in options.peak:
         for controller, sensors in MEASURED:
-            stem = f"{file_stem(controller)}/{file_stem(sensors)}-{peak:g}"
-            found[controller, sensors, peak] = Task(stem, measure, _settings(controller, sensors, peak, options))
+            found[controller, sensors, peak] = _measured(controller, sensors, peak, options)
         found[peak] = Task(f"allowed/{peak:g}", allowed, _settings("admittance-adaptive", "ideal", peak, options))
     return found
 

@@ -48,7 +48,7 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    ("studies.sensorless.own_logs",), {"duration": 5.0, "episodes": 128, "seed": 936000}, _logs, _kept,
+    ("studies.sensorless.own_logs",), {"duration": 5.0, "episodes": 256, "seed": 936000}, _logs, _kept,
     {**SENSORLESS.units, "misfit": "of the log's noise", "value": "the parameter's"}, _shown, further=_felt,
     words={"duration": "s of each log", "episodes": "drawn worlds"},
 )  # fmt: skip

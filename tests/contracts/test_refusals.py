@@ -139,6 +139,7 @@ TABLE = [
     (score, "environment", ("BirthSIM/Square-v1", "BirthSIM/Circle-v0", "CartPole-v1", None), CIRCLE),
     (score, "sensors", ("perfect",), "'ideal', 'lab'"),
     (score, "randomize", ("plant",), "False, True"),
+    (score, "score", (None, "1", True), "a number or an array of numbers"),
     (training, "step", (3,), "environment, algorithm, steps, "),
     (training, "algorithm", ("dqn",), "'ppo', 'sac', 'tqc'"),
     (training, "steps", (0, -5, 1e6), "a whole number >= 1 and <= "),

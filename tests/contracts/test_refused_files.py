@@ -207,6 +207,7 @@ TABLE = {
         ("time,a\n0,1\n1,x\n", "", "line 3: '1,x'; allowed: 2 numbers, for time, a"),
         ("time,a\n0,1\n1\n", "", "line 3: '1'; allowed: 2 numbers, for time, a"),
         ("time,a,a\n0,1,2\n", "", "has two columns 'a'; allowed: one of each name"),
+        ("time;a\n0;1\n", "", "has one column, 'time;a'; allowed: columns separated by commas"),
         ("time,a\n" + "1," * 2**20, "", "log.csv'", " allowed: at most 1048576"),
     ],
     ("recorded", "bad.rec"): [

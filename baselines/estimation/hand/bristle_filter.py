@@ -7,6 +7,8 @@ piston reveals f by its bristles, 20 um for 1 N, hence slowly; a sliding one by 
 creeps under its noise; here the model alone moves the bristles at rest.
 """
 
+import math
+
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
@@ -31,9 +33,8 @@ SLIDES = 5e-3
 FIRST_PUSH, FIRST_BRISTLE = 1.0, 2.0
 """N; assumed: standard deviations of f and of s0 z at a start."""
 
-
-LEAST_FRICTION = 1e-3
-"""N; a piston without friction is believed to have this, so that its bristles bend by a distance."""
+LEAST_FRICTION, LEAST_SPEED = 1e-3, 1e-12
+"""N and m/s; assumed: a piston is believed to have no less, so that its bristles bend by a distance and wear down one way."""
 
 
 class Bristled(Rows):
@@ -71,6 +72,12 @@ def _way(speed: float) -> float:
 
 
 @helper
+def _wear(speed: float, variance: float) -> float:
+    """Mean of |v|, m/s, where ``speed`` is known with a ``variance``, m2/s2; of a normal distribution to a tenth."""
+    return max(math.sqrt(speed * speed + 2.0 / math.pi * max(variance, 0.0)), LEAST_SPEED)
+
+
+@helper
 def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: float, noise: float, p: Rig) -> None:
     """Starts piston ``k`` of lane ``i`` at a measured ``position`` with a ``speed``, where friction and ``push``, N, balance
     the rest."""
@@ -87,25 +94,26 @@ def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: floa
 
 @helper
 def predict(
-    b: Bristled, k: int, i: int, load: float, own: float, answer: float, push_noise: float, p: Rig, period: float
-) -> None:
+    b: Bristled, k: int, i: int, load: float, own: float, answer: float, push_noise: float, unseen: float, p: Rig, period: float
+) -> None:  # fmt: skip
     """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
-    forces; ``answer``, 1/kg, to a force; ``push_noise``, N2/s, that drives f."""
+    forces; ``answer``, 1/kg, to a force; ``push_noise``, N2/s, that drives f; ``unseen``, the part of the variance of v that is
+    motion, which wears bristles down, rather than ignorance of a piston that rests."""
     coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
     viscous = p.fv1 if k == 0 else p.fv2
     most = max(static, LEAST_FRICTION) / p.s0
     v, z = b.speed[k, i], max(-most, min(most, b.bristle[k, i]))
-    slack = _slack(v, coulomb, static, p)
-    kept = 1.0 / (1.0 + period * abs(v) / slack)
-    bends, relaxes = kept * (1.0 - _way(v) * z / slack), kept * abs(v) / slack
+    slack, fast = _slack(v, coulomb, static, p), _wear(v, unseen * b.vv[k, i])
+    kept = 1.0 / (1.0 + period * fast / slack)
+    bends, relaxes = kept * (1.0 - v / fast * z / slack), kept * fast / slack
     rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
     step = period * answer
     av, az, af = 1.0 - step * (viscous + p.s1 * bends), -step * (p.s0 - p.s1 * relaxes), step
     v += period * rate
-    slack = _slack(v, coulomb, static, p)
-    kept = 1.0 / (1.0 + period * abs(v) / slack)
+    slack, fast = _slack(v, coulomb, static, p), _wear(v, unseen * b.vv[k, i])
+    kept = 1.0 / (1.0 + period * fast / slack)
     z = kept * (z + period * v)
-    bend = period * kept * (1.0 - _way(v) * z / slack)
+    bend = period * kept * (1.0 - v / fast * z / slack)
     bv, bz, bf = bend * av, kept + bend * az, bend * af
     b.position[k, i] += period * v
     b.speed[k, i], b.bristle[k, i] = v, z

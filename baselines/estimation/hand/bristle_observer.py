@@ -6,15 +6,16 @@ What is left at the start, before a hand comes, is taken for an error of the mas
 
 import math
 
-from baselines.estimation.hand import bristle_filter, force_bias, quiet_force
+from baselines.estimation.hand import force_bias, quiet_force
 from baselines.estimation.hand.bristle_filter import Bristled
+from baselines.estimation.hand.bristled_pistons import carry, see
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
 from baselines.estimation.hand.quiet_force import Quiet
-from baselines.estimation.rows import Belief, Pistons
-from birthsim_env.loop.rows import Signals
+from baselines.estimation.rows import Belief
+from birthsim_env.loop.rows import POSITION, Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import geometry, mechanics
+from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, part, row
@@ -33,60 +34,33 @@ class Felt(Rows):
 
 
 @helper
-def _since(pistons: Pistons, k: int, i: int, joints: Joints, periods: float) -> float:
-    """How far piston ``k`` of lane ``i`` has moved in the last ``periods``, by its observer, m; 0 where speeds are measured."""
-    past, slot = pistons.past, int(pistons.slot[i])
-    depth = past.shape[0] // 2
-    if depth == 0:
-        return 0.0
-    back = min(int(periods), depth - 2)
-    newer, older = past[2 * ((slot - back) % depth) + k, i], past[2 * ((slot - back - 1) % depth) + k, i]
-    moved: float = joints.position[k, i] - (newer + min(periods - back, 1.0) * (older - newer))
-    return moved
-
-
-@helper
 def observe(
     hand: Hand,
     felt: Felt,
     seen: Signals,
-    pistons: Pistons,
     joints: Joints,
     pressures: Array,
     noise: Array,
     about: Belief,
     fresh: Array,
 ) -> None:
-    """Carries ``hand`` and ``felt`` on by one period, at whose end ``pistons`` are observed and pressures (4, N), Pa, known.
+    """Carries ``hand`` and ``felt`` on by one period, at whose end ``joints`` and pressures (4, N), Pa, are known.
 
     ``noise`` (N,), m, is that of a position sample.
     """
     p, period, b, air = about.rig, about.period, felt.pistons, PerChamber(pressures)
-    point, sample = Point(scratch(Point.size)), Joints(scratch(Joints.size))
+    sample = Joints(scratch(Joints.size))
+    piston_motion(seen.rows[POSITION : POSITION + Point.size], p, sample.rows, fresh.shape[0])
     for i in range(fresh.shape[0]):
-        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
-        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
+        pose = geometry.pose(
+            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
+        _, _, _, _, _, kappa, sine, cosine = pose
         sampled = seen.position_time[i] - felt.newest[i]
         felt.newest[i] = seen.position_time[i]
-        own1 = mechanics.acceleration1(0.0, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
-        own2 = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity)
-        load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
-        load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere)
-        if fresh[i] > 0.0:
-            bristle_filter.begin(b, 0, i, y1, 0.0, -load1 - own1 * p.mass * kappa * kappa, noise[i] / kappa, p)
-            bristle_filter.begin(b, 1, i, y2, 0.0, -load2 - own2 * p.mass, noise[i], p)
-        bristle_filter.predict(b, 0, i, load1, own1, p.inverse_mass / (kappa * kappa), PUSH_NOISE, p, period)
-        bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, PUSH_NOISE, p, period)
+        carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, 0.0, p, period, fresh[i] > 0.0)
         if sampled > 0.0:
-            for axis in range(2):
-                point.position[axis, 0], point.velocity[axis, 0] = seen.position[axis, i], seen.velocity[axis, i]
-            piston_motion(point.rows, p, sample.rows, 1)
-            for k in range(2):
-                since = _since(pistons, k, i, joints, (seen.time[i] - seen.position_time[i]) / period)
-                off = sample.position[k, 0] - (b.position[k, i] - since)
-                bristle_filter.correct(b, k, i, off, noise[i] / kappa if k == 0 else noise[i])
+            see(b, i, sample, joints, kappa, seen.time[i] - seen.position_time[i], noise[i])
         across, along = -b.push[0, i] / kappa, b.push[1, i]
         hand.filtered[0, i], hand.filtered[1, i] = across * cosine + along * sine, across * sine - along * cosine
     bare = scratch(2)[:, : fresh.shape[0]]

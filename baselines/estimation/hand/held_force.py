@@ -11,7 +11,7 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 
-QUICK, SLOW = 20.0, 3.0
+QUICK, SLOW = 10.0, 3.0
 """1/s, of the low-passes on which a rest is judged; assumed."""
 
 STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 2.5
@@ -20,7 +20,7 @@ STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 2.5
 SETTLES = 0.9
 """s that the force must stay as it is before the head counts as resting; found by trial."""
 
-FIRST, AVERAGED, DRIFT = 0.1, 0.4, 0.2
+FIRST, AVERAGED, DRIFT = 0.1, 1.0, 0.2
 """s, s and 1/s: the force at rest is a mean that begins with the weight of ``FIRST``, for ``AVERAGED``, and then a low-pass."""
 
 

@@ -13,14 +13,15 @@ import math
 from baselines.estimation.hand import bristle_filter, force_bias, held_force
 from baselines.estimation.hand.bristle_filter import SLIDES
 from baselines.estimation.hand.bristle_observer import Felt
+from baselines.estimation.hand.bristled_pistons import carry, see
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
 from baselines.estimation.hand.held_force import Hold
 from baselines.estimation.inertial import Moving
 from baselines.estimation.rows import Belief
-from birthsim_env.loop.rows import Signals
+from birthsim_env.loop.rows import POSITION, Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import geometry, mechanics
+from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
@@ -32,12 +33,13 @@ PUSH_NOISE, WEIGHED = 0.3, 0.15
 """N2/s and m/s2: density of the noise that drives the hand's force, until innovations tell of more, and standard deviation of
 an acceleration; found by trial. The sensor's low-pass and the model of the pressures count as noise, too."""
 
-SPEED_AT_REST, SPEED_SLIDING = 3e-3, 3e-5
+SPEED_AT_REST, SPEED_SLIDING = 5e-3, 3e-5
 """m/s: standard deviations of a speed that ``inertial`` finds, found by trial. Its errors of 0.24 mm/s last for 0.1 s, in which
 a resting piston's bristles would gather them. Those of a sliding one forget them."""
 
-LATE = 0.01
-"""s; found by trial: a moving head is off by so much times its speed, as a tracker is later than believed."""
+UNSEEN = 0.1
+"""Part of the variance of a piston's speed that is motion: valves shake a resting piston by 0.1 to 0.3 mm/s, of which 0.07 mm/s
+are not seen, a third of what the filter believes. Found by trial; with 0 bristles were believed 0.3 N too bent after a stop."""
 
 
 @helper
@@ -48,24 +50,17 @@ def observe(
     """Carries ``hand``, ``felt`` and ``hold`` on by one period; ``moving`` is the end effector, ``pressures`` (4, N), Pa, the
     chambers', ``noise`` (N,), m, that of a position sample."""
     p, period, b, air = about.rig, about.period, felt.pistons, PerChamber(pressures)
-    point, sample, bare = Point(scratch(Point.size)), Joints(scratch(Joints.size)), scratch(2)[:, : fresh.shape[0]]
+    sample, bare = Joints(scratch(Joints.size)), scratch(2)[:, : fresh.shape[0]]
+    piston_motion(seen.rows[POSITION : POSITION + Point.size], p, sample.rows, fresh.shape[0])
     share = period / (1.0 / QUICKNESS + period)
     for i in range(fresh.shape[0]):
-        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
-        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
+        pose = geometry.pose(
+            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
-        age, sampled = seen.time[i] - seen.position_time[i], seen.position_time[i] - felt.newest[i]
+        _, _, _, _, _, kappa, sine, cosine = pose
+        sampled = seen.position_time[i] - felt.newest[i]
         felt.newest[i] = seen.position_time[i]
-        own1 = mechanics.acceleration1(0.0, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
-        own2 = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity)
-        load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
-        load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere)
-        if fresh[i] > 0.0:
-            bristle_filter.begin(b, 0, i, y1, v1, -load1 - own1 * p.mass * kappa * kappa, noise[i] / kappa, p)
-            bristle_filter.begin(b, 1, i, y2, v2, -load2 - own2 * p.mass, noise[i], p)
-        bristle_filter.predict(b, 0, i, load1, own1, p.inverse_mass / (kappa * kappa), PUSH_NOISE, p, period)
-        bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, PUSH_NOISE, p, period)
+        load1, load2 = carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, UNSEEN, p, period, fresh[i] > 0.0)
         ax, ay = moving.acceleration[0, i], moving.acceleration[1, i] + p.gravity
         left1 = -kappa * p.mass * (ax * cosine + ay * sine) - load1
         left2 = p.mass * (ax * sine - ay * cosine) - load2
@@ -75,12 +70,7 @@ def observe(
         bristle_filter.weigh(b, 0, i, left1, kappa * WEIGHED * p.mass, p)
         bristle_filter.weigh(b, 1, i, left2, WEIGHED * p.mass, p)
         if sampled > 0.0:
-            for axis in range(2):
-                point.position[axis, 0], point.velocity[axis, 0] = seen.position[axis, i], seen.velocity[axis, i]
-            piston_motion(point.rows, p, sample.rows, 1)
-            for k in range(2):
-                v, spread = joints.speed[k, i], noise[i] / kappa if k == 0 else noise[i]
-                bristle_filter.correct(b, k, i, sample.position[k, 0] - (b.position[k, i] - v * age), spread + LATE * abs(v))
+            see(b, i, sample, joints, kappa, seen.time[i] - seen.position_time[i], noise[i])
         across = -(left1 + bristle_filter.drag(b, 0, i, p)) / kappa
         along = left2 + bristle_filter.drag(b, 1, i, p)
         x, y = across * cosine + along * sine, across * sine - along * cosine

@@ -78,7 +78,8 @@ def described(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> st
     for name, (low, high) in randomize.items():
         section, _, own = name.partition(".")
         words = f"{own} of {section}" if section.startswith("cylinder") else own
-        named.append(f"{words.replace('_', ' ')} {low:.4g} to {high:.4g} {field_of(name).metadata['unit']}")
+        unit = field_of(name).metadata["unit"].removeprefix("-")
+        named.append(f"{words.replace('_', ' ')} {low:.4g} to {high:.4g} {unit}".rstrip())
     drawn = "rigs" if set(randomize) - set(drawn_by(sensors)) else "sensors"
     return f"{drawn} drawn: {', '.join(named)}" if named else "the rig as described"
 

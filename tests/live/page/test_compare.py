@@ -68,7 +68,7 @@ def test_whichever_head_is_dragged_one_place_of_the_hand_pulls_both(pair, k):
     figures = "[...document.querySelectorAll('.rigs figure')]"
     captions = f"{figures}.map((one) => [...one.querySelectorAll('i')].map((i) => i.textContent))"
     pair.wait(f"{captions}.every(([error, rms, felt]) => error > 0 || rms > 0) && {captions}[1][1] > 0.2")
-    assert pair.value(f"{captions}[0][2]") == "2,000"
+    pair.wait(f"{captions}[0][2] === '2,000'")
     pair.page.mouse.up()
     pair.wait("birthsim.frame.second.pointer === null && Math.hypot(...birthsim.frame.second.force) === 0")
 
