@@ -80,8 +80,8 @@ def read(b):
     return np.array([b.position[1, 0], b.speed[1, 0], b.bristle[1, 0], b.push[1, 0]]), after
 
 
-@pytest.mark.parametrize("speed", [0.003, -0.2])
-def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
+@pytest.mark.parametrize(("speed", "unseen"), [(0.003, 0.0), (0.003, 0.1), (-0.2, 0.0)])
+def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed, unseen):
     """P' = A P A^T + Q with A from central differences of the step itself."""
     rng = np.random.default_rng(3)
     root = rng.standard_normal((4, 4)) * np.array([1e-4, 1e-2, 3e-5, 2.0])[:, None]
@@ -89,7 +89,7 @@ def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed):
 
     def step(state, covariance=before):
         b = believed(state, covariance)
-        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, P, PERIOD)
+        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, PUSH_NOISE, unseen, P, PERIOD)
         return read(b)
 
     sizes = np.array([1e-7, 1e-6, 1e-8, 1e-4])
