@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from birthsim.doctor import extras
 from birthsim.door import COMMANDS
 from birthsim.export import FORMS
 from tests.console import ROOT, assert_picture, call, run
@@ -69,6 +70,14 @@ def test_doctor_names_what_is_missing(monkeypatch, capsys):
     assert [name for name, line in extras.items() if not line.endswith("works")] == ["tune"]
     assert extras["tune"].endswith("pip install 'birthsim[tune]'")
     assert max(map(len, printed.splitlines())) <= 80 + len(str(Path.cwd()))
+
+
+def test_cupy_for_another_cuda_serves_as_the_extras_own(monkeypatch):
+    here = {"cupy-cuda13x", "nvidia-cuda-nvcc", "llvmlite"}
+    monkeypatch.setattr("birthsim.doctor.found", lambda name: "1.0" if name in here else None)
+    assert extras()["cuda"] == []
+    here.remove("cupy-cuda13x")
+    assert extras()["cuda"] == ["cupy-cuda12x"]
 
 
 def test_studies_come_with_a_clone(monkeypatch, capsys):

@@ -132,11 +132,7 @@ def predict(
     b.yy[k, i] += period * (2.0 * ay + period * vv)
     b.yv[k, i], b.yz[k, i], b.yf[k, i] = ay + period * vv, by + period * vz, yf + period * avf
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = vv, vz, avf
-    b.zz[k, i], b.zf[k, i], b.ff[k, i] = (
-        zz,
-        bvf,
-        ff + period * push_noise * (1.0 + alert),
-    )
+    b.zz[k, i], b.zf[k, i], b.ff[k, i] = zz, bvf, ff + period * push_noise * (1.0 + alert)
 
 
 @helper

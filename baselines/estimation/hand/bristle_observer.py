@@ -35,14 +35,7 @@ class Felt(Rows):
 
 @helper
 def observe(
-    hand: Hand,
-    felt: Felt,
-    seen: Signals,
-    joints: Joints,
-    pressures: Array,
-    noise: Array,
-    about: Belief,
-    fresh: Array,
+    hand: Hand, felt: Felt, seen: Signals, joints: Joints, pressures: Array, noise: Array, about: Belief, fresh: Array
 ) -> None:
     """Carries ``hand`` and ``felt`` on by one period, at whose end ``joints`` and pressures (4, N), Pa, are known.
 
