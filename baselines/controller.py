@@ -107,8 +107,8 @@ def require_stiffness(reference: Reference, least: float) -> None:
     """Raises ``ValueError`` for a setpoint [[Kclx, Kclxy], [Kclxy, Kcly]] that somewhere is not stiffer than ``least``, N/m."""
     (kx, ky), kxy = reference.stiffness, reference.stiffness_coupling
     softest = 0.5 * (kx + ky) - np.hypot(0.5 * (kx - ky), kxy)
-    if (softest <= least).any():
-        lane = int(np.argmax(softest <= least))
+    if not (softest > least).all():
+        lane = int(np.argmin(softest > least))
         raise ValueError(
             f"stiffness setpoint [[{kx[lane]:g}, {kxy[lane]:g}], [{kxy[lane]:g}, {ky[lane]:g}]] N/m in lane {lane}; "
             f"allowed: more than {least:.3g} N/m in every direction"

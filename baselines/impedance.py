@@ -6,6 +6,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -63,6 +64,7 @@ def matrix_root(matrix: Array) -> Array:
 
 def mass_spring_damper(reference: Reference, mass: float, damping_ratio: float) -> Impedance:
     """The impedance of ``baselines.estimation.admittance``: mass m (kg), the stiffness asked for, B = 2 zeta (m K)^(1/2)."""
+    require_good(reference)
     stiffness = stiffness_matrix(reference)
     damping = 2.0 * damping_ratio * mass * matrix_root(stiffness / mass)
     return Impedance(np.broadcast_to(mass * np.eye(2)[:, :, None], stiffness.shape).copy(), damping, stiffness)

@@ -16,6 +16,7 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller, PlainLaw, check_flags
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
+from baselines.staged import StagedController
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.rig.parameters import Parameters
@@ -25,6 +26,9 @@ Factory = Callable[..., Controller]
 
 LIMITED = "limited:"
 """Before a controller's name: the controller in a ``PortLimiter``."""
+
+GUARDING = ("on_fault", "fault_time")
+"""Options of every compiled controller: what happens where a sensor says nothing finite, see ``StagedController.protect``."""
 
 ENTRY_POINTS = "birthsim.controllers"
 """Entry point group by which a package that builds on this one adds controllers."""
@@ -136,10 +140,12 @@ def known_options(name: str) -> list[str] | None:
         return []
     parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
     named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(kind, "TUNABLE", {})
+    guarded = GUARDING if inspect.isclass(kind) and issubclass(kind, StagedController) else ()
     if kind is _backstepping:
         law = CartesianBackstepping if resolved(name)[1].get("cartesian") else BacksteppingController
-        return [*list(inspect.signature(law).parameters)[1:], *named]
-    return [*named, *tunable] if tunable or len(named) + 1 == len(parameters) else None
+        return [*list(inspect.signature(law).parameters)[1:], *named, *GUARDING]
+    closed = tunable or len(named) + 1 == len(parameters)
+    return [*named, *tunable, *guarded] if closed else None
 
 
 def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
@@ -157,8 +163,15 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
             raise ValueError(
                 f"controller = {shown(name)}: {option} = {shown(value)} is unknown; allowed for {plain}: {allowed}"
             )
-    law = _factory(name)(parameters, **{**named, **options})
-    return PortLimiter(law, parameters) if name.startswith(LIMITED) else law
+    given = {**named, **options}
+    guarding = {option: given.pop(option) for option in GUARDING if option in given}
+    law = _factory(name)(parameters, **given)
+    whole = PortLimiter(law, parameters) if name.startswith(LIMITED) else law
+    if not guarding:
+        return whole
+    if not isinstance(whole, StagedController):
+        raise ValueError(f"{', '.join(guarding)} for controller = {shown(name)}; allowed: for a controller of the package")
+    return whole.protect(**guarding)
 
 
 def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Controller:

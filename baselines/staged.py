@@ -7,20 +7,33 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baselines.controller import Controller, checked_command
-from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import ACTION, ASKED, FEEDFORWARD, OPENING, REFERENCE, Seen, fill_measurement
+from birthsim_env.loop import guard
+from birthsim_env.loop.loop import MixedLoop
+from birthsim_env.loop.rows import (
+    ACTION,
+    ASKED,
+    FAULT,
+    FEEDFORWARD,
+    OPENING,
+    REFERENCE,
+    Seen,
+    fill_measurement,
+    measurement_of,
+)
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.parts.actuation import Forgetful
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import is_within, near, shown
 
 NO_ACTION = np.zeros(0, dtype=np.float32)
 """What a single environment's ``step`` takes where a controller drives it."""
@@ -72,6 +85,8 @@ def feedforward_rows(
                     f"{name} has shape {np.shape(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
                 )
             rows[:] = one
+            if not np.isfinite(rows).all():
+                raise ValueError(f"{name} has {rows[~np.isfinite(rows)][0]:g}; allowed: finite numbers")
     return given
 
 
@@ -90,6 +105,7 @@ class StagedController:
     """A law that is compiled stages. A law derives from it, gives ``law_stages`` and says in ``explain`` what it refuses.
 
     ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
+    A sample that is not finite is replaced by the last good one (``birthsim_env.loop.guard``); ``missed`` counts the periods.
     """
 
     COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = COMMAND_OPTIONS
@@ -98,17 +114,60 @@ class StagedController:
     asks: ClassVar[bool] = False
     """Whether the stages themselves say what the law is asked for, and the forces that it is to believe in."""
 
+    reads_force: bool = True
+    """Whether the law needs ``Measurement.user_force``."""
+
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
         self.parameters = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
         self._lanes, self._sampled = 0, False
         self._made: list[LawStage] = []
         self._memories: list[Array] = []
-        self._loop: Loop | None = None
+        self._kept: Array = np.zeros((guard.Kept.size, 0))
+        self._loop: MixedLoop | None = None
+        self.protect()
 
     def __getstate__(self) -> dict[str, object]:
         """Without the loop, which knows addresses."""
         return {**self.__dict__, "_loop": None}
+
+    def protect(self, on_fault: str = "hold", fault_time: float = guard.FAULT_TIME) -> Self:
+        """Choose what happens where a signal that the law reads is not finite, and forget the past.
+
+        Parameters
+        ----------
+        on_fault
+            "hold" closes all valves, "vent" opens all chambers to the exhaust, once the control has ended.
+        fault_time
+            s, from 0 to 10, for which such a signal may be missing before the control ends, until ``reset``.
+
+        Returns
+        -------
+        StagedController
+            Itself.
+
+        Raises
+        ------
+        ValueError
+            For another ``on_fault``, and a ``fault_time`` out of its range.
+        """
+        if not isinstance(on_fault, str) or on_fault not in guard.ON_FAULT:
+            like = near(on_fault, guard.ON_FAULT) if isinstance(on_fault, str) else ""
+            raise ValueError(f"on_fault = {shown(on_fault)}{like}; allowed: {', '.join(guard.ON_FAULT)}")
+        if not is_within(fault_time, least=0.0, most=10.0):
+            raise ValueError(f"fault_time = {shown(fault_time)}; allowed: a number >= 0 and <= 10 (s)")
+        self._on_fault, self._fault_time, self._lanes, self._loop = on_fault, float(fault_time), 0, None
+        return self
+
+    @property
+    def missed(self) -> NDArray[np.int64]:
+        """Control periods since the start in which a signal that the law reads was replaced, (N,)."""
+        return guard.Kept(self._kept).missed.astype(np.int64)
+
+    @property
+    def ended(self) -> NDArray[np.bool_]:
+        """Where a signal was missing for longer than ``fault_time``, so that the control has ended, (N,)."""
+        return guard.Kept(self._kept).ended > 0.0
 
     def is_compiled(self) -> bool:
         """Whether ``stages`` are all that ``command`` does: not where a derived class has changed it."""
@@ -119,28 +178,48 @@ class StagedController:
         raise NotImplementedError(f"{type(self).__name__}.law_stages(sampled) is missing; it returns LawStage objects")
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the ``ValueError`` for signals, over N lanes, that a stage could not serve."""
+        """Raise the ``ValueError`` for signals, over N lanes, that a stage of the law could not serve."""
         raise ValueError(f"{type(self).__name__} has no gains for one of the setpoints")
+
+    def refuse(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the ``ValueError`` for signals, over N lanes, that one of ``stages`` could not serve."""
+        guard.require_good(reference)
+        self.explain(measurement, reference)
 
     def prepare(self, lanes: int, sampled: bool) -> None:
         """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
         if (lanes, sampled) != (self._lanes, self._sampled):
             self._lanes, self._sampled, self._made, self._loop = lanes, sampled, list(self.law_stages(sampled)), None
             self._memories = [np.repeat(one.fresh[:, None], lanes, axis=1) for one in self._made]
+            self._kept = np.repeat(guard.fresh(self.parameters)[:, None], lanes, axis=1)
+            self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
+            self._openings: Array = np.zeros((4, lanes))
 
-    def policy_stages(self) -> list[Stage]:
+    def policy_stages(self) -> list[Part]:
         """What runs before the law, once prepared: a policy where it has one."""
         return []
 
-    def stages(self) -> list[Stage]:
+    def inner_stages(self) -> list[Part]:
         """Policy and law as stages of a closed loop, with what they remember."""
         pairs = zip(self._made, self._memories, strict=True)
         own = (Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs)
         return [*self.policy_stages(), *([] if self.asks else [Stage(ask, sees_world=False)]), *own]
 
+    def stages(self) -> list[Part]:
+        """What runs where signals come from outside, once prepared: ``inner_stages`` between those of ``guard``."""
+        reads = {*guard.SIGNALS} - {"user_force", "acceleration"}
+        reads |= {"user_force"} if self.reads_force else set()
+        reads |= {"acceleration"} if self._reads_acceleration() else set()
+        about = guard.limits(self.parameters, reads, self._on_fault, self._fault_time)
+        first = Stage(guard.let_pass, about, self._kept, sees_world=False)
+        return [first, *self.inner_stages(), Stage(guard.end, about, sees_world=False)]
+
+    def _reads_acceleration(self) -> bool:
+        return any(one.reads_acceleration for one in self._made)
+
     def require_acceleration(self, measurement: Measurement) -> None:
         """Raise ``ValueError`` without an acceleration where the law, once prepared, needs one."""
-        if measurement.acceleration is None and any(one.reads_acceleration for one in self._made):
+        if measurement.acceleration is None and self._reads_acceleration():
             raise ValueError(
                 f"measurement.acceleration = None; allowed: (2, {self._lanes}) m/s2, since this controller believes in a "
                 f"sensor: electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
@@ -153,6 +232,8 @@ class StagedController:
         elif self._lanes:
             for one, memory in zip(self._made, self._memories, strict=True):
                 memory[:, lanes] = one.fresh[:, None]
+            self._kept[:, lanes] = guard.fresh(self.parameters)[:, None]
+            self._openings[:, lanes] = 0.0
 
     def command(
         self,
@@ -167,39 +248,37 @@ class StagedController:
         Called once per control period. ``feedforward_force`` (2, N), N, along cylinders 1 and 2, is added to what the law
         believes acts on the pistons, and ``feedforward_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies
         the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``COMMAND_OPTIONS``, for signals
-        over different numbers of lanes, for setpoints that the law cannot render, and where an acceleration is missing.
+        over different numbers of lanes, for setpoints that are not finite or that the law cannot render, and where an
+        acceleration is missing. What is measured and not finite is no error: see ``protect``, ``missed`` and ``ended``.
         """
         given = (feedforward_force, feedforward_rate, damping_factor)
         if measurement.position.ndim == 1:
             options = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *options)[:, 0]
         if self.run_stages(measurement, reference, given):
-            self.explain(measurement, reference)
+            self.refuse(measurement, reference)
         return self._openings.copy()
 
-    def run_stages(
-        self, measurement: Measurement, reference: Reference, given: Sequence[Array | None] = (), commanded: Array | None = None
-    ) -> int:
-        """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve.
-
-        What is ``commanded`` (4, N) already, the stages find as openings.
-        """
+    def run_stages(self, measurement: Measurement, reference: Reference, given: Sequence[Array | None] = ()) -> int:
+        """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve."""
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
         self.require_acceleration(measurement)
         if self._loop is None:
-            self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
-            self._openings: Array = np.zeros((4, lanes))
-            unchanged = self._seen.view()
-            unchanged.flags.writeable = False
-            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
-            self._loop = Loop(lanes, [], placed, self.stages())
+            self._felt, self._said = measurement.acceleration is not None, np.zeros((2, lanes))
+            more, stages, signals = self.more_rows(lanes), self.stages(), self._seen.view()
+            # Only what is called back reads the signals that the first stage writes.
+            signals.flags.writeable = not all(isinstance(one, Stage) for one in stages)
+            placed = [(signals, 0), (self._asked, ASKED), (self._openings, OPENING), (self._said, FAULT)]
+            self._loop = MixedLoop(lanes, [], [*placed, *more], stages)
         self._asked[REFERENCES:] = feedforward_rows(lanes, *given, taken=self.COMMAND_OPTIONS)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = reference.rows
-        if commanded is not None:
-            self._openings[:] = commanded
         return self._loop.run()
+
+    def good_signals(self) -> tuple[Measurement, Reference]:
+        """What was measured and asked for in this control period, once the first stage has replaced what is not good."""
+        return measurement_of(self._seen, self._sampled, self._felt), Reference(self._seen[REFERENCE:].copy())
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays of a derived class, once prepared, that its stages read or write besides, with their rows of ``Seen``."""
@@ -246,10 +325,10 @@ class CompiledDriving(Driving):
 
     controller: StagedController
 
-    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
-        """The law, compiled into the closed loop."""
+    def stages(self, lanes: int, sampled: bool, foreign: bool) -> list[Part]:
+        """The law, compiled into the closed loop; what sensors of the package measure needs no guard."""
         self.controller.prepare(lanes, sampled)
-        return self.controller.stages()
+        return self.controller.stages() if foreign else self.controller.inner_stages()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays that the loop places in rows of ``Seen``."""
@@ -260,7 +339,7 @@ class CompiledDriving(Driving):
         return [(feedforward_rows(lanes, force, rate, factor, taken=self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        self.controller.explain(measurement, reference)
+        self.controller.refuse(measurement, reference)
 
     def check(self, measurement: Measurement) -> None:
         """Raise ``ValueError`` where episodes begin with less than the law has to measure."""

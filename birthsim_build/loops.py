@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, cast
 
 import gymnasium
 import numpy as np
@@ -77,7 +77,7 @@ def staged_part(law: StagedController, sampled: bool) -> Part:
     law.prepare(1, sampled)
     placed = law.more_rows(1) if law.asks else [(np.zeros((DAMPING - FEEDFORWARD, 1)), FEEDFORWARD)]
     rows = {WORLD + first + k: value for array, first in placed for k, value in enumerate(array[:, 0].tolist())}
-    return Part(tuple(law.stages()), rows)
+    return Part(tuple(cast(list[Stage], law.stages())), rows)
 
 
 def _made(name: str, rig: Parameters) -> Any:

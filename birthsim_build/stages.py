@@ -132,10 +132,23 @@ def _pull(world: World, inputs: Inputs, i: int) -> bool:
     return held or size > 0.0
 
 
+@helper
+def _keep_finite(rows: Array, before: Array, i: int) -> int:
+    """Puts all ``rows`` back to those of the period ``before`` where one is not finite; 1 where that was so."""
+    bad = 0
+    for row in range(before.shape[0]):
+        bad = bad if math.isfinite(rows[row, i]) else 1
+    for row in range(before.shape[0] if bad else 0):
+        rows[row, i] = before[row, i]
+    return bad
+
+
 @kernel
 def outside(world: World, seen: Seen, inputs: Inputs, constants: int, tables: int, lane: int, n: int) -> int:
-    """Inputs act on what the scenario asks for and on its hand's force, and what jumped passes over."""
-    asked, force, own = seen.reference.rows, world.force, inputs.passages
+    """Inputs act on what the scenario asks for and on its hand's force, and what jumped passes over.
+
+    Inputs that are not finite change nothing; returns in how many lanes there are some."""
+    asked, force, own, refused = seen.reference.rows, world.force, inputs.passages, 0
     for i in range(n):
         now = inputs.clock[i]
         inputs.episode_time[i], seen.time[i] = seen.time[i], now
@@ -165,7 +178,8 @@ def outside(world: World, seen: Seen, inputs: Inputs, constants: int, tables: in
                 force[axis, i] += inputs.add_force[axis, i]
             if pulled:
                 force[axis, i] += inputs.pointer_force[axis, i]
-    return 0
+        refused += _keep_finite(asked, inputs.given.rows, i) | _keep_finite(force, inputs.given_force, i)
+    return refused
 
 
 class Period(Numbers):

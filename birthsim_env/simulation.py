@@ -5,7 +5,6 @@ plant moves, and then reference, hand and sensors are brought to the new instant
 all periods of a policy step are one call; the loop stops only for what a user has written in Python.
 """
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -16,7 +15,7 @@ from birthsim_env.loop.instant import Instant
 from birthsim_env.loop.loop import MixedLoop, Place
 from birthsim_env.loop.rows import fill_measurement
 from birthsim_env.loop.signals import Mask, Reference
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import checked_start
@@ -35,8 +34,6 @@ from birthsim_env.physics.strength import require_carried
 
 if TYPE_CHECKING:
     from birthsim_env.gradients import Pullback
-
-Part = Stage | Callable[[int], None]
 
 LOOKS = ("target", "setpoints", "hand", "jumps", "sensors")
 """Parts that run where an episode begins."""
@@ -224,13 +221,17 @@ class Simulation(Instant):
         stages, put_out = getattr(self.actuation, "stages", None), hasattr(self.sensors, "put_out")
         board = getattr(self.sensors, "board_stage", lambda: self._put_out)
         measure = self._compiled(self.sensors, "measure", self._measure)
+        target = self._compiled(self.trajectory, "sample", self._follow)
+        setpoints = self._compiled(self.stiffness, "sample", self._set)
+        hand = self._compiled(self.user_force, "force", self._push)
+        foreign = not all(isinstance(one, Stage) for one in (measure, target, setpoints, hand))
         return {
-            "actuation": [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask],
+            "actuation": [*stages(self.plant.num_envs, self.sensors.sampled, foreign)] if stages else [self._ask],
             "board": [board()] if put_out else [],
             "plant": [plant_stage(self.plant.lane_parameters, self.plant.memory, self.period)],
-            "target": [self._compiled(self.trajectory, "sample", self._follow)],
-            "setpoints": [self._compiled(self.stiffness, "sample", self._set)],
-            "hand": [self._compiled(self.user_force, "force", self._push)],
+            "target": [target],
+            "setpoints": [setpoints],
+            "hand": [hand],
             "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, begins)],
             "sensors": [measure] if self.force_sensor else [measure, no_force_stage()],
         }

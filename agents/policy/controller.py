@@ -1,9 +1,8 @@
 """A trained residual as a controller: what the environments do inside, from measurements alone."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,10 @@ from agents.policy.stage import policy_stage
 from agents.residual.law import ResidualLaw, memory_names, observation_names
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import policy_periods
-from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.signals import Mask
+from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.loop.world import no_force_stage
 from birthsim_env.observation import observe
-from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
@@ -56,8 +54,7 @@ class ResidualController(ResidualLaw):
         super().__init__(rig, settings)
         self._periods = policy_periods(settings.policy_period, rig)
         self._calls = 0
-        self._before: list[Stage] = []
-        self._cells: Array = np.zeros((0, 0))
+        self._before: list[Part] = []
 
     def is_compiled(self) -> bool:
         """Whether the policy is a network, which runs in the loop, and no function."""
@@ -67,43 +64,43 @@ class ResidualController(ResidualLaw):
         super().reset(lanes)
         if lanes is None:
             self._calls = 0
-        elif self._lanes:
-            self._cells[:, lanes] = 0.0
+        else:
+            for one in self._before:
+                if isinstance(one, Stage) and one.memory is not None:
+                    one.memory[1:, lanes] = 0.0
         forget = getattr(self._function, "reset", None)
         if forget is not None:
             forget(lanes)
 
     def prepare(self, lanes: int, sampled: bool) -> None:
         if (lanes, sampled) != (self._lanes, self._sampled):
-            self._cells, self._before = np.zeros((0, lanes)), [] if self.settings.force_sensor else [no_force_stage()]
+            self._before = [] if self.settings.force_sensor else [no_force_stage()]
             if self._network is not None:
                 shown = len(memory_names(self.settings))
                 own = policy_stage(self._network, self._periods, self.settings.size, shown, self._p, lanes)
-                assert own.memory is not None
-                self._before, self._cells = [*self._before, own], own.memory[1:]
+                self._before = [*self._before, own]
+            else:
+                self._before = [*self._before, self._ask]
         super().prepare(lanes, sampled)
 
-    def policy_stages(self) -> list[Stage]:
+    def policy_stages(self) -> list[Part]:
         """The policy, and before it what it must not see."""
         return self._before
 
-    def command(self, measurement: Measurement, reference: Reference, *options: Any) -> Array:
-        """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""
-        if self._function is not None and measurement.position.ndim > 1:
-            self.prepare(measurement.position.shape[1], measurement.sampled)
-            if self._calls % self._periods == 0:
-                self._ask(self._function, measurement, reference)
-            self._calls += 1
-        return super().command(measurement, reference, *options)
-
-    def _ask(self, function: PolicyFunction, measurement: Measurement, reference: Reference) -> None:
-        if not self.settings.force_sensor:
-            measurement = replace(measurement, user_force=np.zeros_like(measurement.user_force))
-        seen = observe(measurement, reference, np.concatenate([self.action, self.shown]), self._p)
-        actions, expected = function(seen), (self.action.shape[1], self.settings.size)
-        if np.shape(actions) != expected:
-            raise ValueError(f"policy gives actions {np.shape(actions)}; allowed: {expected}")
-        self.accept(np.asarray(actions, dtype=np.float64).T)
+    def _ask(self, period: int) -> None:
+        """A function is asked once a policy period."""
+        assert self._function is not None
+        if self._calls % self._periods == 0:
+            measurement, reference = self.good_signals()
+            seen = observe(measurement, reference, np.concatenate([self.action, self.shown]), self._p)
+            actions, expected = self._function(seen), (self.action.shape[1], self.settings.size)
+            if np.shape(actions) != expected:
+                raise ValueError(f"policy gives actions {np.shape(actions)}; allowed: {expected}")
+            array = np.asarray(actions, dtype=np.float64)
+            if not np.isfinite(array).all():
+                raise ValueError(f"policy gives the action {array[~np.isfinite(array)][0]:g}; allowed: finite numbers")
+            self.accept(array.T)
+        self._calls += 1
 
 
 def _stored(place: str | Path) -> tuple[PolicyNetwork, ResidualSettings]:

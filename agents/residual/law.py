@@ -194,7 +194,7 @@ class ResidualLaw(StagedController):
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         super().__init__(parameters)
-        self.settings = settings
+        self.settings, self.reads_force = settings, settings.force_sensor
         # Every law takes forces to believe in; those that have an impedance also a damping factor.
         self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, self.parameters)
         self.action: Array = np.zeros((settings.size, 0))

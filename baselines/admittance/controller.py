@@ -120,7 +120,8 @@ class AdmittanceController(StagedController):
         if gains.get("yielding", 1.0) > 1:
             raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
         super().__init__(parameters)
-        self._force_sensor, self._learn, self._identified = bool(force_sensor), bool(learn), bool(identified)
+        self.reads_force = self._force_sensor = bool(force_sensor)
+        self._learn, self._identified = bool(learn), bool(identified)
         self._own = gains
 
     @property

@@ -25,6 +25,7 @@ class CartesianBackstepping(StagedController):
     """
 
     COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ()
+    reads_force = False
 
     def __init__(
         self,

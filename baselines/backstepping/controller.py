@@ -116,6 +116,8 @@ class BacksteppingController(StagedController):
     without positive gains and those at which the law would swing (``stiffest``).
     """
 
+    reads_force = False
+
     def __init__(
         self,
         parameters: Parameters | str | Path | None = None,

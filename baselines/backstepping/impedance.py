@@ -13,6 +13,7 @@ import numpy as np
 
 from baselines.backstepping.gains import gains_for
 from baselines.impedance import Impedance, matrix_root, stiffness_matrix
+from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
@@ -35,6 +36,7 @@ def paper_impedance(reference: Reference, rig: Parameters, damping_ratio: float 
     ``damping_ratio`` as in ``BacksteppingController``. Raises ``ValueError`` for setpoints without positive gains and for a
     pose outside the workspace.
     """
+    require_good(reference)
     columns = jacobian(inverse_geometry(reference.position, rig), rig)
     lanes = columns.shape[2]
     joints = np.empty((3, 2, lanes))
@@ -54,6 +56,7 @@ def cartesian_impedance(reference: Reference, rig: Parameters) -> Impedance:
 
     Raises ``ValueError`` for a pose outside the workspace.
     """
+    require_good(reference)
     mass, columns = rig.mechanics.mass, jacobian(inverse_geometry(reference.position, rig), rig)
     viscous = np.array([rig.cylinder1.viscous_friction, rig.cylinder2.viscous_friction])
     drag = _turned(np.repeat(viscous[:, None], columns.shape[2], axis=1), columns)

@@ -62,8 +62,8 @@ def require_softer(reference: Reference, rig: Parameters, sampled: bool) -> None
     """Raises ``ValueError`` for the first lane with a setpoint at which the law would swing."""
     (kx, ky), kxy, most = reference.stiffness, reference.stiffness_coupling, stiffest(rig, sampled)
     largest = 0.5 * (kx + ky) + np.hypot(0.5 * (kx - ky), kxy)
-    if (largest > most).any():
-        lane = int(np.argmax(largest > most))
+    if not (largest <= most).all():
+        lane = int(np.argmin(largest <= most))
         kind = "sampled" if sampled else "exact"
         raise ValueError(
             f"reference.stiffness = ({kx[lane]:g}, {ky[lane]:g}) N/m in lane {lane}; allowed: at most {most:.0f} N/m in every "

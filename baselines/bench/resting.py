@@ -9,6 +9,7 @@ from baselines.staged import driving
 from birthsim_env.loop.loop import MixedLoop, available_threads
 from birthsim_env.loop.rows import ASKED, REFERENCE, TIME
 from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.stage import Part
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.references import Trajectory
@@ -18,7 +19,7 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.simulation import Part, Simulation
+from birthsim_env.simulation import Simulation
 
 
 class RestingRigs(Simulation):

@@ -10,9 +10,9 @@ from baselines.controller import Controller
 from baselines.identification.experiment import Plan
 from baselines.identification.trial import Trial
 from birthsim_env.loop.signals import REFERENCES, Reference
+from birthsim_env.loop.stage import Part
 from birthsim_env.parts.own_parts import Through
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.simulation import Part
 
 STIFFNESS = 3000.0
 """N/m asked of the law in both directions; laws that know no stiffness ignore it."""

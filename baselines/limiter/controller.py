@@ -32,7 +32,7 @@ from baselines.limiter.port_energy import Energy, Work, count_work
 from baselines.staged import LawStage, StagedController, lanes_of, one_lane
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerChamber, Point, Reference
-from birthsim_env.loop.stage import Stage, block, scratch
+from birthsim_env.loop.stage import Part, Stage, block, scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
@@ -184,6 +184,8 @@ class PortLimiter(StagedController):
                 checked_number(name, value, unit, above=0.0)
         super().__init__(parameters)
         self.law, self._capacity, self._speed = law, capacity, speed
+        self._options: dict[str, Any] = {}
+        self.reads_force = capacity < math.inf or getattr(law, "reads_force", True)
         self._stages = law if isinstance(law, StagedController) and law.is_compiled() else None
 
     @property
@@ -228,13 +230,19 @@ class PortLimiter(StagedController):
             self._stages.prepare(lanes, sampled)
         super().prepare(lanes, sampled)
 
-    def policy_stages(self) -> list[Stage]:
+    def policy_stages(self) -> list[Part]:
         return [] if self._stages is None else self._stages.policy_stages()
 
-    def stages(self) -> list[Stage]:
+    def inner_stages(self) -> list[Part]:
         """The law's, and the limits."""
         own = Stage(self._made[0].function, self._made[0].constants, self._memories[0], sees_world=False)
-        return [*([] if self._stages is None else self._stages.stages()), own]
+        return [*([self._call] if self._stages is None else self._stages.inner_stages()), own]
+
+    def _call(self, period: int) -> None:
+        """The law, where it is not compiled."""
+        measurement, reference = self.good_signals()
+        openings = self.law.command(measurement, reference, **self._options)
+        self._openings[:] = checked_command(type(self.law).__name__, openings, lanes_of(measurement, reference))
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         return [] if self._stages is None else self._stages.more_rows(lanes)
@@ -246,6 +254,9 @@ class PortLimiter(StagedController):
     def require_acceleration(self, measurement: Measurement) -> None:
         if self._stages is not None:
             self._stages.require_acceleration(measurement)
+
+    def _reads_acceleration(self) -> bool:
+        return self._stages is not None and self._stages._reads_acceleration()
 
     def reset(self, lanes: Mask | None = None) -> None:
         self.law.reset(lanes)
@@ -262,7 +273,7 @@ class PortLimiter(StagedController):
         if measurement.position.ndim == 1:
             options = {name: np.asarray(given)[..., None] for name, given in options.items()}
             return self.command(*one_lane(measurement, reference), **options)[:, 0]
-        openings = self.law.command(measurement, reference, **options)
-        openings = checked_command(type(self.law).__name__, openings, lanes_of(measurement, reference))
-        self.run_stages(measurement, reference, commanded=openings)
+        self._options = options
+        if self.run_stages(measurement, reference):
+            self.refuse(measurement, reference)
         return self._openings.copy()

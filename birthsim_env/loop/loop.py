@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import SEEN, TIME, WORLD
-from birthsim_env.loop.stage import Stage, address_of, carray, described, pointer
+from birthsim_env.loop.stage import Part, Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -165,7 +165,7 @@ class MixedLoop:
         lanes: int,
         world: Sequence[Place],
         seen: Sequence[Place],
-        parts: Sequence[Stage | Callable[[int], None]],
+        parts: Sequence[Part],
         closing: Sequence[Stage] = (),
     ) -> None:
         groups = [(kind, list(group)) for kind, group in groupby(parts, lambda part: isinstance(part, Stage))]

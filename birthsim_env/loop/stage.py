@@ -207,3 +207,7 @@ class Stage:
         arrays = (*self.tables, *(() if self.memory is None else (self.memory,)))
         places = tuple((array.__array_interface__["data"][0], array.shape) for array in arrays)
         return self.function, self.constants.tobytes(), places
+
+
+Part = Stage | Callable[[int], None]
+"""A stage, or what a loop calls back with the number of the period: a user's own Python."""

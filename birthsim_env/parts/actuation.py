@@ -38,7 +38,8 @@ class Actuation(Protocol):
       describes its rows.
 
     The loop stops for ``openings``, once a policy step or once a control period. An actuation of the package also has
-    ``stages(lanes, sampled)``, which are compiled into the loop. Where these show a memory it has the rows ``shown`` (M, N).
+    ``stages(lanes, sampled, foreign)``, which are compiled into the loop; ``foreign`` is True where signals come from a
+    user's own Python, and may be anything. Where these show a memory it has the rows ``shown`` (M, N).
     Its ``explain(measurement, reference)`` raises the error for what the stages could not serve.
     """
 
@@ -138,7 +139,7 @@ class _ByLayout(Forgetful):
         function, sees_world = self.kernel
         return Stage(function, Layout.numbers(one_valve=self._one_valve), sees_world=sees_world)
 
-    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
+    def stages(self, lanes: int, sampled: bool, foreign: bool) -> list[Stage]:
         """``openings``, compiled into the closed loop."""
         return [self._stage()]
 

@@ -217,7 +217,9 @@ def controller_parts(law: StagedController) -> dict[str, dict[str, Part]]:
     parts = {}
     for kind, sampled in (("exact", False), ("sampled", True)):
         whole = staged_part(law, sampled)
-        count = len(law.policy_stages())
+        # What guards the signals comes first, before a policy or else before the law.
+        policies = len(law.policy_stages())
+        count = policies + 1 if policies else 0
         policy = {"policy": Part(whole.stages[:count], whole.rows)} if count else {}
         parts[kind] = {**policy, "law": Part(whole.stages[count:], {} if count else whole.rows)}
     return parts

@@ -14,12 +14,12 @@ from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Reference
+from birthsim_env.loop.stage import Part
 from birthsim_env.parts.own_parts import Through
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.simulation import Part
 from studies.recovery.tasks import SENSORS, drawn_rig
 from studies.strangers.model import Strangeness, Stranger
 

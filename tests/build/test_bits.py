@@ -6,11 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from baselines.registry import make_controller
 from birthsim_build.building import build_c
 from birthsim_build.bundle import Bundle, identifier
 from birthsim_build.code.targets import HOST
 from birthsim_build.loops import plant_world
-from birthsim_env import Parameters, Plant
+from birthsim_env import Parameters, Plant, Reference
+from birthsim_env.loop.rows import POSITION, REFERENCE, measurement_of
 from studies.targets import reference
 from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
 from studies.targets.running import EMULATED, ROW, emulated_rows, library_rows
@@ -74,6 +76,26 @@ def test_a_law_alone(rows_of, sensors):
     seen, openings = law_openings(LAW, sensors)
     rows = rows_of(f"law_{identifier(LAW)}_{KINDS[sensors]}", "controller", LAW, sensors, inputs=as_inputs(seen))
     assert_same_bits(rows[:, OPENINGS], openings)
+
+
+@pytest.mark.parametrize("sensors", KINDS)
+def test_a_law_alone_whose_sensors_fail(rows_of, sensors):
+    """Single samples, and an outage that ends the control: the openings, the count and the fault of Python."""
+    seen = np.array(law_openings(LAW, sensors)[0])
+    rng, rows = np.random.default_rng(0), np.arange(REFERENCE)
+    for period in rng.choice(np.arange(1, PERIODS - 100), 200, replace=False):
+        seen[period, rng.choice(rows, 2)] = rng.choice([np.nan, np.inf, -np.inf, 1e300])
+    seen[-100:, POSITION] = np.nan
+    law, openings, counted = make_controller(LAW, Parameters()), np.empty((PERIODS, 4)), np.empty((PERIODS, 2))
+    for k in range(PERIODS):
+        measured = measurement_of(seen[k][:, None], sensors == "lab", False)
+        openings[k] = law.command(measured, Reference(seen[k, REFERENCE:][:, None].copy()))[:, 0]
+        counted[k] = law.missed[0], 2.0 * law.ended[0]
+    rows = rows_of(f"law_{identifier(LAW)}_{KINDS[sensors]}", "controller", LAW, sensors, inputs=as_inputs(seen))
+    assert_same_bits(rows[:, OPENINGS], openings)
+    assert_same_bits(rows[:, [ROW["missed"], ROW["fault"]]], counted)
+    assert (openings[-1] == 0.0).all()
+    assert counted[-1, 0] > 200
 
 
 @pytest.mark.slow

@@ -75,3 +75,18 @@ def test_a_setpoint_that_cannot_be_served_is_counted(loop):
     assert advance(words, 5) == 0
     rows[ROW["keep_Kclx"]], rows[ROW["add_Kclx"]] = 0.0, -100.0
     assert advance(words, 5) == 4  # the law sees in the next period what is asked for in this one
+
+
+@pytest.mark.parametrize("name", ["add_x", "add_Kclx", "add_force_x", "pointer_x", "pointer_stiffness", "push_y"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_an_input_that_is_not_finite_is_counted_and_changes_nothing_for_good(loop, name, value):
+    advance, words = loop
+    rows = words[HEAD : HEAD + ROWS].view(np.float64)
+    rows[ROW["pointer_x"]], rows[ROW["pointer_y"]], rows[ROW["pointer_held"]] = 0.5, 0.0, 1.0
+    assert advance(words, 50) == 0
+    before, rows[ROW[name]] = rows[ROW[name]], value
+    assert advance(words, 20) >= (20 if np.isnan(value) else 0)
+    assert np.isfinite(rows[[ROW["x"], ROW["y"], ROW["force_x"], ROW["opening_P1"], ROW["reference_Kclx"]]]).all()
+    rows[ROW[name]] = before
+    assert advance(words, 50) == 0
+    assert np.isfinite(rows[[ROW["x"], ROW["y"], ROW["force_x"], ROW["opening_P1"], ROW["reference_Kclx"]]]).all()
