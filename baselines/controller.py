@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
@@ -105,10 +106,11 @@ def check_flags(flags: Mapping[str, object]) -> None:
 
 def require_stiffness(reference: Reference, least: float) -> None:
     """Raises ``ValueError`` for a setpoint [[Kclx, Kclxy], [Kclxy, Kcly]] that somewhere is not stiffer than ``least``, N/m."""
+    require_good(reference)
     (kx, ky), kxy = reference.stiffness, reference.stiffness_coupling
     softest = 0.5 * (kx + ky) - np.hypot(0.5 * (kx - ky), kxy)
-    if not (softest > least).all():
-        lane = int(np.argmin(softest > least))
+    if (softest <= least).any():
+        lane = int(np.argmax(softest <= least))
         raise ValueError(
             f"stiffness setpoint [[{kx[lane]:g}, {kxy[lane]:g}], [{kxy[lane]:g}, {ky[lane]:g}]] N/m in lane {lane}; "
             f"allowed: more than {least:.3g} N/m in every direction"

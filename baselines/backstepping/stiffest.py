@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from baselines.staged import LawStage
+from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -60,10 +61,11 @@ def stiffness_range(rig: Parameters, sampled: bool) -> LawStage:
 
 def require_softer(reference: Reference, rig: Parameters, sampled: bool) -> None:
     """Raises ``ValueError`` for the first lane with a setpoint at which the law would swing."""
+    require_good(reference)
     (kx, ky), kxy, most = reference.stiffness, reference.stiffness_coupling, stiffest(rig, sampled)
     largest = 0.5 * (kx + ky) + np.hypot(0.5 * (kx - ky), kxy)
-    if not (largest <= most).all():
-        lane = int(np.argmin(largest <= most))
+    if (largest > most).any():
+        lane = int(np.argmax(largest > most))
         kind = "sampled" if sampled else "exact"
         raise ValueError(
             f"reference.stiffness = ({kx[lane]:g}, {ky[lane]:g}) N/m in lane {lane}; allowed: at most {most:.0f} N/m in every "
