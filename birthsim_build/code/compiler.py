@@ -19,6 +19,7 @@ import numpy as np
 from llvmlite.binding import llvm_version_info
 
 from birthsim_build.code.threads import Threads
+from birthsim_build.code.tools import run_tool
 from birthsim_build.image import Words
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.sources import source_stamp
@@ -115,7 +116,7 @@ def require_linker() -> None:
 
 def link(*arguments: str) -> None:
     """Run a linker of PyPI's ``ziglang``, ``wasm-ld`` or ``ld.lld``; ``ValueError`` where it refuses."""
-    done = subprocess.run([sys.executable, "-m", "ziglang", *arguments], capture_output=True, text=True)
+    done = run_tool(sys.executable, "-m", "ziglang", *arguments)
     if done.returncode:
         said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]
         raise ValueError(f"{arguments[0]} fails: {said[0]}")

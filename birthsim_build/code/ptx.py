@@ -2,9 +2,10 @@
 
 import re
 import shutil
-import subprocess
 from importlib.util import find_spec
 from pathlib import Path
+
+from birthsim_build.code.tools import run_tool
 
 GPU = re.compile(r"sm_\d{2,3}[a-z]?")
 _FUNCTION = re.compile(r"Function properties for (\w+)\s+(\d+) bytes stack frame, (\d+) bytes spill stores")
@@ -35,7 +36,7 @@ def assemble(ptx: Path, cubin: Path, gpu: str, *options: str) -> dict[str, int]:
     if not GPU.fullmatch(gpu):
         raise ValueError(f"gpu = {gpu!r}; allowed: sm_ and the number of an architecture, as sm_90")
     line = [require_assembler(), "-v", f"-arch={gpu}", *options, str(ptx), "-o", str(cubin)]
-    done = subprocess.run(line, capture_output=True, text=True)
+    done = run_tool(*line)
     said = done.stdout + done.stderr
     if done.returncode:
         raise ValueError(f"ptxas for gpu = {gpu!r} fails: {said.strip().splitlines()[0]}")

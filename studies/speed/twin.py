@@ -2,11 +2,11 @@
 
 import ctypes
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 
+from birthsim_build.code.tools import run_tool
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES, Array
 
 SOURCE = Path(__file__).with_name("twin.c")
@@ -50,6 +50,6 @@ class Twin:
 
 
 def _gcc(*arguments: str) -> None:
-    done = subprocess.run(["gcc", *arguments], capture_output=True, text=True, check=False)
+    done = run_tool("gcc", *arguments)
     if done.returncode:
         raise ValueError(f"gcc {' '.join(arguments)}: {done.stderr.strip()}")

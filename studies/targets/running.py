@@ -12,6 +12,7 @@ import numpy as np
 
 from birthsim_build.bundle import identifier
 from birthsim_build.code.threads import Threads
+from birthsim_build.code.tools import run_tool
 from birthsim_build.device.export import write_programs
 from birthsim_build.device.machine import WIDTH, Host
 from birthsim_build.image import HEAD
@@ -75,7 +76,7 @@ def emulated_rows(target: str, folder: Path, name: str, periods: int, seen: Arra
     given = (("LOOP", f"birthsim_{name}"), ("PERIODS", periods), ("FIRST", WORLD), ("COUNT", 0 if seen is None else ASKED))
     line = [sys.executable, "-m", "ziglang", "cc", "-target", system, "-static", "-O1", "-I", str(folder)]
     line += [*(f"-D{key}={value}" for key, value in given), str(HERE / "trace.c"), str(folder / "birthsim.o")]
-    subprocess.run([*line, "-o", str(folder / "trace")], check=True)
+    run_tool(*line, "-o", str(folder / "trace")).check_returncode()
     content = b"" if seen is None else np.ascontiguousarray(seen).tobytes()
     done = subprocess.run([program, str(folder / "trace")], input=content, check=True, capture_output=True)
     return np.frombuffer(done.stdout).reshape(periods, ROWS)
