@@ -1,5 +1,6 @@
 """birthsim live: the rig in the browser, in real time, to see and to push."""
 
+import socket
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +14,7 @@ from birthsim_env.physics.rig.values import shown
 from birthsim_live.commands.serving import need_server, serve
 from birthsim_live.logs.recording import load_recording
 from birthsim_live.rig.folder import Packed, offer, packed_page, write_page
-from birthsim_live.server.addresses import listen
+from birthsim_live.server.addresses import host_name, listen
 
 
 @dataclass(kw_only=True)
@@ -28,6 +29,8 @@ class Settings(Configured):
     """0 takes any that is free; else 8000, with --replay 8001."""
     host: str = "127.0.0.1"
     """Address or name to serve; other than the loopback it lets in everybody who can reach it."""
+    allowed_host: Annotated[list[str], MANY, Parameter(metavar="NAME...")] = field(default_factory=list)
+    """Names by which pages are opened besides, behind a published port or a proxy; with them --host may be 0.0.0.0."""
     request_time: Annotated[float, number("S", above=0.0, most=3600.0)] = 10.0
     """Seconds in which a request must arrive; then its connection is closed."""
     parameters: RigFile = None
@@ -51,9 +54,15 @@ def main(settings: Settings) -> None:
         print(f"written to {settings.static}: {size / 1e6:.2f} MB; {seen}")
     else:
         need_server()
-        with listen(settings.host, 8000 if settings.port is None else settings.port) as listening:
+        with _listening(settings, 8000) as listening:
             rig = load_parameters(settings.parameters)
             serve(_packed(settings, rig), rig, listening, settings, "birthsim live")
+
+
+def _listening(settings: Settings, port: int) -> socket.socket:
+    """The socket of the settings, on ``port`` unless they name another."""
+    settings.allowed_host = [host_name(name) for name in settings.allowed_host]
+    return listen(settings.host, port if settings.port is None else settings.port, bool(settings.allowed_host))
 
 
 def _packed(settings: Settings, rig: Parameters) -> Packed:
@@ -78,7 +87,7 @@ def _replay(settings: Settings, file: Path) -> None:
     need_server()
     from birthsim_live.rig.greeting import greeting  # which draws
 
-    with listen(settings.host, 8001 if settings.port is None else settings.port) as listening:
+    with _listening(settings, 8001) as listening:
         recording = load_recording(file)
         packed = packed_page(Parameters())
         # It draws the recording's rig; the one that it could run stands still and is not seen.

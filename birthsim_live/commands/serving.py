@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from baselines.commands.start import endings
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import Packed, write_page
-from birthsim_live.server.addresses import LOOPBACK, is_loopback
+from birthsim_live.server.addresses import LOOPBACK, is_loopback, is_unspecified
 
 if TYPE_CHECKING:
     from birthsim_live.commands.live import Settings
@@ -36,8 +36,11 @@ def serve(packed: Packed, rig: Parameters, listening: socket.socket, settings: "
     from birthsim_live.server.app import create_app
     from birthsim_live.server.connections import configured
 
-    host: str = settings.host
-    loopback = is_loopback(host)
+    address, port, *_ = listening.getsockname()
+    # One that means every address is nobody's name: pages are opened by those that are allowed.
+    own = [] if is_unspecified(address) else [settings.host]
+    host = [*own, *settings.allowed_host][0]
+    loopback = is_loopback(settings.host)
 
     class Server(uvicorn.Server):
         """Ends at once at the second signal."""
@@ -51,14 +54,13 @@ def serve(packed: Packed, rig: Parameters, listening: socket.socket, settings: "
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "page"
         write_page(folder, packed, settings.replay)
-        app = create_app(folder, rig, packed.content["python"], {host, *LOOPBACK} if loopback else {host})
-        print(
-            f"{title}: http://{f'[{host}]' if ':' in host else host}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True
-        )
+        hosts = {*settings.allowed_host, *(LOOPBACK if loopback else ()), *own}
+        app = create_app(folder, rig, packed.content["python"], hosts)
+        print(f"{title}: http://{f'[{host}]' if ':' in host else host}:{port}  (Ctrl-C ends it)", flush=True)
         if not loopback:
             print(
-                f"exposed: everybody who can reach {host} may run this page's controllers on this machine; there is no "
-                "password and no encryption. Pages must be opened by exactly this name.",
+                f"exposed: everybody who can reach {settings.host} may run this page's controllers on this machine; there is "
+                f"no password and no encryption. Pages must be opened by exactly {' or '.join(sorted(hosts))}.",
                 flush=True,
             )
         server = Server(configured(app, settings.request_time))

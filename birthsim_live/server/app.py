@@ -48,10 +48,11 @@ class OriginMiddleware:
     def _refusal(self, headers: Headers) -> str | None:
         host, origin = headers.get("host", ""), headers.get("origin")
         if _name(host) not in self._hosts:
-            return f"host {host[:80]!r} is foreign; allowed: {', '.join(sorted(self._hosts))}"
+            allowed = f"allowed: {', '.join(sorted(self._hosts))}, and what birthsim live is given as --allowed-host NAME"
+            return f"host {host[:80]!r} is foreign; {allowed}"
         # A program that is no browser sends no origin.
         if origin is not None and origin.lower() not in (f"http://{host.lower()}", f"https://{host.lower()}"):
-            return f"origin {origin[:80]!r} is foreign; allowed: that of the page itself"
+            return f"origin {origin[:80]!r} is foreign; allowed: that of the page itself; a proxy has to hand its Host on"
         return None
 
 

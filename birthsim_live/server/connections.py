@@ -9,9 +9,25 @@ import h11
 import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 LARGEST = 1 << 12
 """Bytes of a message; a larger one closes its socket."""
+
+
+UNREAD = 1 << 18
+"""Bytes of answers that a client may leave unread; a socket with more is closed."""
+
+
+class BoundedSockets(WebSocketsSansIOProtocol):
+    """Closes a socket whose client sends pings and never reads what they are answered with."""
+
+    def handle_ping(self) -> None:
+        if self.transport.is_closing():
+            return
+        super().handle_ping()
+        if self.transport.get_write_buffer_size() > UNREAD:
+            self.transport.abort()
 
 
 class TimedRequests(H11Protocol):
@@ -51,7 +67,7 @@ def configured(app: ASGIApp, request_time: float) -> uvicorn.Config:
     """What a server needs to serve ``app``; a request has ``request_time`` s to arrive."""
     config = uvicorn.Config(
         app, log_level="warning", http=partial(TimedRequests, request_time),  # type: ignore[arg-type]
-        ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
+        ws=BoundedSockets, ws_max_size=LARGEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
         proxy_headers=False, server_header=False,
     )  # fmt: skip
     logging.getLogger("uvicorn.error").addFilter(_worth_a_line)

@@ -7,6 +7,7 @@ answer is a line of text, and the end.
 """
 
 import asyncio
+import contextlib
 import traceback
 from collections.abc import Callable, Collection
 from concurrent.futures import Future
@@ -16,12 +17,18 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from baselines.controller import Controller, checked_command
 from birthsim_env.loop.rows import ASKED, REFERENCE, measurement_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import problem, shown
+
+BYTES = 8 * (1 + ASKED)
+"""Of a question."""
 
 
 def made(name: str, rig: Parameters) -> Controller:
@@ -49,16 +56,46 @@ async def command(socket: WebSocket, rig: Parameters, names: Collection[str]) ->
     try:
         law = await asked(made, name, rig)
         while True:
-            numbers = np.frombuffer(await socket.receive_bytes())
-            await socket.send_bytes(await asked(openings, law, name, rig, numbers))
+            sampled, rows = measured(await socket.receive())
+            await socket.send_bytes(await asked(openings, law, name, rig, sampled, rows))
     except WebSocketDisconnect:
         return
+    except UnreadableError as error:
+        await _refuse(socket, f"ValueError: {error}", 1003)
     except Exception as error:
         traceback.print_exc()
-        await socket.send_text("".join(traceback.format_exception_only(error)).strip().splitlines()[-1])
-        await socket.close()
+        await _refuse(socket, "".join(traceback.format_exception_only(error)).strip().splitlines()[-1], 1000)
     finally:
         questions.put(None)
+
+
+async def _refuse(socket: WebSocket, words: str, code: int) -> None:
+    """Say why there is no answer, and end, where somebody is still there to hear it."""
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+        await socket.send_text(words)
+        await socket.close(code)
+
+
+class UnreadableError(ValueError):
+    """A message that is no measurement: the client's fault, of which the author of a controller need not know."""
+
+
+def measured(message: Message) -> tuple[bool, NDArray[np.float64]]:
+    """Whether positions are samples, and the rows ``Signals`` (ASKED, 1), in a message of the socket.
+
+    Raises ``WebSocketDisconnect`` at its end, and ``UnreadableError`` for one that is no measurement.
+    """
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message.get("code", 1005), message.get("reason"))
+    content = message.get("bytes")
+    if content is None:
+        raise UnreadableError(f"a message of text, {shown(message.get('text'))}; allowed: {1 + ASKED} float64, {BYTES} bytes")
+    if len(content) != BYTES:
+        raise UnreadableError(f"a message of {len(content)} bytes; allowed: {1 + ASKED} float64, {BYTES} bytes")
+    numbers = np.frombuffer(content)
+    if numbers[0] not in (0.0, 1.0):
+        raise UnreadableError(f"the first number is {numbers[0]:g}; allowed: 1 where positions are samples, else 0")
+    return bool(numbers[0]), numbers[1:, None].copy()
 
 
 def _answer(questions: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]) -> None:
@@ -68,15 +105,14 @@ def _answer(questions: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]
         if answer.set_running_or_notify_cancel():
             try:
                 answer.set_result(function())
-            except BaseException as error:  # a user's own code may also end Python
+            except Exception as error:
                 answer.set_exception(error)
+            except BaseException as error:  # a user's own code that ends Python, which would end the server
+                answer.set_exception(RuntimeError(f"it ends Python: {problem(error)}"))
 
 
-def openings(law: Controller, name: str, rig: Parameters, numbers: Any) -> bytes:
-    """What a controller answers, as four numbers."""
-    if numbers.shape != (1 + ASKED,):
-        raise ValueError(f"{numbers.size} numbers; allowed: {1 + ASKED}")
-    sampled, rows = bool(numbers[0]), numbers[1:, None].copy()
+def openings(law: Controller, name: str, rig: Parameters, sampled: bool, rows: NDArray[np.float64]) -> bytes:
+    """What a controller answers to ``measured``, as four numbers."""
     has_acceleration = sampled and rig.electronics.acceleration_bandwidth > 0.0
     measurement = measurement_of(rows, sampled, has_acceleration)
     return checked_command(name, law.command(measurement, Reference(rows[REFERENCE:])), 1).tobytes()

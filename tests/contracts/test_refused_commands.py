@@ -146,6 +146,7 @@ TABLE = {
     "identify log.csv --out rig.toml": "log = 'log.csv' cannot be read: No such file or directory",
     "identify log.csv --out rig.toml --parameters no.toml": "parameters = 'no.toml' cannot be read",
     "live --host 0.0.0.0 --port 0": "host = '0.0.0.0' means every address",
+    "live --allowed-host http://rig:80 --port 0": "--allowed-host 'http://rig:80'; allowed: a name or address alone",
     "live --port 0 --replay none.rec": "none.rec' cannot be read",
     "live --port 0 --compare nobody": "controller = 'nobody'; allowed: backstepping",
     "live --static page --compare nobody": "controller = 'nobody'; allowed: backstepping",

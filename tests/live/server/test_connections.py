@@ -78,6 +78,22 @@ def test_text_that_is_no_text_closes_its_window_alone_and_quietly(port, caplog):
     assert caplog.records == []
 
 
+def test_pings_whose_answers_nobody_reads_close_their_socket_alone(port):
+    """Ten times what may be left unread, and what the system's own buffers hold."""
+    with socket.create_connection(("127.0.0.1", port)) as stranger, window(port) as other:
+        stranger.settimeout(60.0)
+        asked = f"GET /controller?name=shut-valves HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+        upgrade = (
+            f"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {'a' * 22}==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+        )
+        stranger.sendall(f"{asked}{upgrade}".encode())
+        assert b"101" in stranger.recv(1000)
+        ping = b"\x89" + bytes([0x80 | 125]) + b"\0" * 129
+        with pytest.raises(OSError):  # noqa: PT011  reset or broken, as the system has it
+            stranger.sendall(400000 * ping)
+        assert answered(other)
+
+
 def test_a_message_that_is_too_large_closes_its_window(port):
     with window(port) as ws:
         ws.send(bytes(LARGEST + 1))

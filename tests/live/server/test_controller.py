@@ -44,6 +44,10 @@ class Slow(Law):
     def before(self):
         time.sleep(0.02)
 
+class Ends(Law):
+    def before(self):
+        raise SystemExit("enough")
+
 class Hangs(Law):
     def before(self):
         time.sleep(5.0)
@@ -81,7 +85,12 @@ def test_it_answers_what_it_commands_in_a_loop(sensors, own, app):
             assert np.array_equal(np.frombuffer(ws.receive_bytes()), after[OPENING : OPENING + 4])
 
 
-ENDS = {"Fails": "ZeroDivisionError: division by zero", "Wide": "command()[0, 0] = 2.0; allowed", "None": "has no 'None'"}
+ENDS = {
+    "Ends": "it ends Python: SystemExit: enough",
+    "Fails": "ZeroDivisionError: division by zero",
+    "Wide": "command()[0, 0] = 2.0; allowed",
+    "None": "has no 'None'",
+}
 
 
 @pytest.mark.parametrize(("kind", "said"), ENDS.items())
@@ -112,11 +121,26 @@ def test_one_that_hangs_stops_nothing_else(own, app):
         assert len(ws.receive_bytes()) == len(last)
 
 
-@pytest.mark.parametrize("content", [b"", b"\0" * 7, b"\0" * 8 * ASKED, b"\0" * 3000])
-def test_what_is_no_measurement_is_refused(content, live, capfd):
+ODD = [
+    *({"bytes": content} for content in (b"", b"\0" * 7, b"\0" * 8 * ASKED, b"\0" * 3000)),
+    *({"bytes": np.concatenate([[first], np.zeros(ASKED)]).tobytes()} for first in (np.nan, np.inf, 2.0, -1.0)),
+    *({"text": words} for words in ("", "{}", "a" * 3000, "null")),
+]
+
+
+@pytest.mark.parametrize("message", ODD)
+def test_what_is_no_measurement_is_refused(message, live, capfd):
+    """In words for whoever sent it; it is no fault of the controller, whose author is shown none."""
     with live.websocket_connect(SOCKET + "shut-valves") as ws:
-        ws.send_bytes(content)
-        assert ws.receive_text().startswith("ValueError: ")
+        ws.send({"type": "websocket.receive", **message})
+        said = ws.receive_text()
+        assert said.startswith("ValueError: ")
+        assert "allowed: " in said
+        assert len(said) < 300
+        with pytest.raises(WebSocketDisconnect) as ended:
+            ws.receive_text()
+    assert ended.value.code == 1003
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["", "pid", "nobody", "/etc/passwd", "mine.py:Law"])
