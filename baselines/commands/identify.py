@@ -81,7 +81,7 @@ def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:
     plan = read_plan(path, rig)
     law = make_controller(settings.controller or "backstepping", unmeasured(rig))
     count = int((plan.times[-1] - plan.times[0]) / rig.electronics.control_period)
-    with _bar(count, "experiment", "period") as tick:
+    with _bar(count, "experiment", "periods") as tick:
         trial = run_plan(plan, [rig], law, settings.sensors or "lab", settings.seed, tick)[0]
     write_trial(trial, out, rig)
     print(f"written to {out}: {len(trial.times)} rows, {trial.times[-1] - trial.times[0]:.4g} s")
@@ -91,7 +91,7 @@ def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
     out = _out(settings, (".toml",))
     trial = read_trial(log, owner)
     folder = None if settings.report is None else make_folder(settings.report)
-    with _bar(None, "fit", "evaluation") as tick:
+    with _bar(None, "fit", "evaluations") as tick:
         found = identify(trial, owner, settings.seed, tick=tick)
     found.write(out, log.name)
     print("\n".join(found.words()))
@@ -119,5 +119,5 @@ def _out(settings: Settings, suffixes: tuple[str, ...]) -> Path:
 
 @contextmanager
 def _bar(total: int | None, title: str, unit: str) -> Iterator[Callable[[], object]]:
-    with tqdm(total=total, desc=title, unit=unit, leave=False) as bar:
+    with tqdm(total=total, desc=title, unit=f" {unit}", leave=False) as bar:
         yield bar.update

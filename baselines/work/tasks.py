@@ -65,7 +65,7 @@ def run_tasks(
     failures: dict[str, str] = {}
     if results:
         print(f"{title}: {len(results)} of {len(tasks)} are there with these settings, rig and code, and are kept")
-    with tqdm(total=len(tasks), initial=len(results), desc=title, unit="piece", disable=not missing) as bar:
+    with tqdm(total=len(tasks), initial=len(results), desc=title, unit=" pieces", disable=not missing) as bar:
 
         def take(number: int, outcome: Result | str) -> None:
             task = missing[number]

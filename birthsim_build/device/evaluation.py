@@ -39,7 +39,8 @@ def evaluate_on(
     pairs = [(view, array) for view, array in zip(lanes.views, pieces.arrays(), strict=True) if view is not None]
     for view, array in pairs:
         view[...] = machine.arrays.asarray(array)
-    for step in tqdm(range(0, env.steps, AT_ONCE), desc=f"{name}, {episodes} episodes", disable=not progress, leave=False):
+    steps, title = range(0, env.steps, AT_ONCE), f"{name}, {episodes} episodes"
+    for step in tqdm(steps, desc=title, unit=" steps", disable=not progress, leave=False):
         missed = lanes.advance(min(AT_ONCE, env.steps - step))
         if missed or step + AT_ONCE >= env.steps:
             for view, array in pairs:
