@@ -54,6 +54,10 @@ class Evaluation:
     cost: float = float("nan")
     traces: list[Array] = field(default_factory=list)
 
+    def settled_error(self) -> dict[str, float]:
+        """What screen and figure say of it: settled error, mm, as of ``summarize``, where a lost episode is infinitely bad."""
+        return summarize(penalize_lost(self.metrics["settled_rms"], self.lost, applies=True))
+
     def summary(self) -> dict[str, dict[str, float]]:
         """Metric -> median, mean, 95 % and maximum over the episodes, of which a lost one is infinitely bad."""
         return {name: summarize(penalize_lost(values, self.lost)) for name, values in self.metrics.items()}
@@ -143,7 +147,8 @@ def _run_batch(
     measures = Measures(simulation, env.steps)
     own = measures.own
     at_once = 1 if measures.stops else AT_ONCE
-    bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
+    title = f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}"
+    bar = tqdm(total=env.steps, desc=title, unit=" steps", disable=not progress, leave=False)
     for step in range(0, env.steps, at_once):
         steps = min(at_once, env.steps - step)
         simulation.run(steps)
@@ -178,7 +183,7 @@ def overview(evaluations: list[Evaluation]) -> str:
     """A short table for the screen: settled error over the episodes, mm, and how many were lost."""
     rows, unsaid = [], []
     for one in evaluations:
-        summary = summarize(penalize_lost(one.metrics["settled_rms"], one.lost, applies=True))
+        summary = one.settled_error()
         figures = [number(summary[key]) for key in ("median", "q95", "max")]
         rows.append([one.controller, *figures, f"{sum(one.lost)} of {len(one.lost)}"])
         # A hand that jumps all the time leaves nothing settled.

@@ -10,6 +10,7 @@ from matplotlib.ticker import MultipleLocator
 
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.measures import TRACE
+from baselines.bench.statistics import number
 from baselines.figures.style import (
     COLOURS,
     COLUMN,
@@ -123,11 +124,24 @@ def episode_figure(episode: dict[str, Array], title: str, folder: Path) -> list[
         return save(figure, folder, "episode")
 
 
+def _smallest(evaluations: Sequence[Evaluation]) -> str:
+    """The metric that ``birthsim evaluate`` prints, of the controller with the smallest."""
+    medians = {label_of(one.controller): one.settled_error()["median"] for one in evaluations}
+    known = {name: median for name, median in medians.items() if not np.isnan(median)}
+    if not known:  # a hand that jumps all the time
+        return "Error over time; nothing settled"
+    best = min(known, key=known.__getitem__)
+    if np.isinf(known[best]):
+        return "Error over time; most episodes were lost"
+    kind = "smallest median" if len(evaluations) > 1 else "median"
+    return f"{best}: {kind} of the settled error, {number(known[best])} mm"
+
+
 def error_over_time(evaluations: Sequence[Evaluation], caption: str, folder: Path) -> list[Path]:
     """Size of the tracking error over time: median and 5-95 % band over the episodes, one line per controller."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(COLUMN, 3.2), layout="constrained")
-        lowest, medians = np.inf, dict[str, float]()
+        lowest = np.inf
         for k, evaluation in enumerate(evaluations):
             style = look(k)
             size = 1e3 * np.linalg.norm(np.concatenate(evaluation.traces, axis=1), axis=2)
@@ -138,12 +152,9 @@ def error_over_time(evaluations: Sequence[Evaluation], caption: str, folder: Pat
             axes.plot(time, middle, **style, lw=0.8, markevery=max(len(time) // 8, 1), label=label_of(evaluation.controller))
             # Every episode starts without error, which would stretch a logarithmic axis without end.
             lowest = min(lowest, float(np.quantile(low, 0.05)))
-            medians[label_of(evaluation.controller)] = float(np.median(middle))
         axes.set(xlabel="time (s)", ylabel="tracking error (mm)", yscale="log")
         axes.set_ylim(bottom=max(lowest / 2, 1e-3))
         axes.yaxis.set_major_formatter("{x:g}")
-        best = min(medians, key=medians.__getitem__)
-        kind = "smallest median" if len(medians) > 1 else "median"
-        headline(figure, f"{best}: {kind} error of {medians[best]:.2g} mm")
+        headline(figure, _smallest(evaluations))
         legend_below(figure, said=f"median, 5 to 95 %: {caption}")
         return save(figure, folder, "error_over_time")

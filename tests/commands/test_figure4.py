@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from baselines.bench.evaluation import Evaluation
+from baselines.bench.evaluation import Evaluation, overview
 from baselines.commands import figure4 as figure4_command
 from baselines.commands.figure4 import FIELDS, figures_of, record_run
 from baselines.figures import runs as figures
@@ -126,6 +126,29 @@ def test_the_error_over_time_shows_the_median_of_every_controller(tmp_path, monk
         np.testing.assert_allclose(time, 0.01 * np.arange(50))
         np.testing.assert_allclose(median, 3.5 * (k + 1))
     plt.close(drawn[0])
+
+
+def test_screen_and_figure_say_one_metric_by_one_name(tmp_path, monkeypatch):
+    """The settled error of ``birthsim evaluate``: not the median over time of what is drawn."""
+    said = []
+    monkeypatch.setattr(figures, "headline", lambda figure, words: said.append(words))
+    monkeypatch.setattr(figures, "save", lambda figure, folder, name: plt.close(figure))
+    trace = [np.full((50, 3, 2), 2e-3)]
+
+    def one(name, settled, lost=(False, False, False)):
+        return Evaluation(name, metrics={"settled_rms": settled}, lost=list(lost), traces=trace)
+
+    good, bad = one("good", [3.3, 3.486, 4.0]), one("bad", [5.0, 6.0, 7.0])
+    for evaluations in ([good], [bad, good], [one("odd", [np.nan] * 3)], [one("lost", [1.0] * 3, [True] * 3)]):
+        error_over_time(evaluations, "some", tmp_path)
+    assert "3.49" in overview([good])
+    assert "settled error, mm" in overview([good])
+    assert said == [
+        "good: median of the settled error, 3.49 mm",
+        "good: smallest median of the settled error, 3.49 mm",
+        "Error over time; nothing settled",
+        "Error over time; most episodes were lost",
+    ]
 
 
 def test_what_is_lost_is_said_to_be_lost(tmp_path, monkeypatch, capsys):
