@@ -256,7 +256,7 @@ fuzz: $(READY)
 docs: $(READY) $(NPM)/.ready
 	rm -rf $(OUT)/docs
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs $(OUT)/docs
-	@echo "open $(OUT)/docs/index.html"
+	@echo "$(BIN)/python -m http.server -d $(OUT)/docs shows it at http://127.0.0.1:8000; opened as a file its rigs stand still"
 
 docs-links: $(READY)
 	$(BIN)/python -m sphinx --builder linkcheck --define nb_execution_mode=off docs $(OUT)/docs-links

@@ -247,3 +247,38 @@ def test_other_names_and_long_sentences_are_found(tmp_path):
     told = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)[0]["messages"]
     assert [(message["line"], message["ruleId"]) for message in told] == [(3, "terminology"), (5, "sentence-length")]
     assert "use “Setpoints” instead" in told[0]["message"]
+
+
+FAILING = """---
+jupytext:
+  text_representation:
+    extension: .md
+    format_name: myst
+kernelspec:
+  name: python3
+---
+# A tutorial
+
+```{code-cell}
+first = 1
+```
+
+```{code-cell}
+first / 0
+```
+"""
+
+
+@pytest.mark.slow
+def test_a_cell_that_fails_is_named_and_no_one_elses_tracker(tmp_path):
+    """With the settings of the site's own notebooks, none of which has a limit of time."""
+    settings = [line for line in (DOCS / "conf.py").read_text(encoding="utf-8").splitlines() if line.startswith("nb_")]
+    assert "nb_execution_timeout = -1" in settings
+    (tmp_path / "conf.py").write_text("\n".join(['extensions = ["myst_nb"]', *settings]))
+    (tmp_path / "index.md").write_text(FAILING)
+    line = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", tmp_path, tmp_path / "out"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    for words in ("index.md: WARNING: Executing notebook failed", "first / 0", "ZeroDivisionError"):
+        assert words in done.stderr
+    assert "sphinx-doc/sphinx/issues" not in done.stderr
