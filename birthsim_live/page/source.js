@@ -12,6 +12,7 @@ export class Source {
     this.known = new Map();
     const all = ["failed", "hello", "settings", "state", "path", "frame", "error"];
     this.connection = new Connection(Object.fromEntries(all.map((kind) => [kind, (message) => this.receive(kind, message)])));
+    document.addEventListener("visibilitychange", () => this.connection.send({ type: "hidden", hidden: document.hidden }));
   }
 
   /** A message of the connection; while a recording plays it is only remembered. */
@@ -45,6 +46,7 @@ export class Source {
       if (!hello) throw new Error("no rig is here yet to draw a recording with; allowed: once one is");
       if (!isDrawn(recording, hello)) throw new Error(`recording = '${file.name}' is of a rig of another shape; allowed: birthsim live --replay FILE`);
       this.connection.send({ type: "release" });
+      this.connection.send({ type: "device", on: false });
       this.player?.stop();
       this.player = new Player(recording, hello, this.handlers);
       this.player.start();

@@ -6,6 +6,7 @@ import { FIELDS } from "../frame.js";
 const RIGS = { "birthsim-recording-2": 1, "birthsim-recording-3": 2 }; // format -> how many rigs a row holds
 const LARGEST = 2 ** 27; // bytes, packed or not
 const [WORDS, CHUNKS] = [2 ** 24, 2 ** 17]; // bytes of JSON, and chunks
+const SETTING = ["string", "number", "boolean"]; // what a setting can be
 const HEAD = 8; // bytes before a chunk
 const FIRST_COLUMNS = Object.keys(FIELDS).filter((name) => !["friction", "flows"].includes(name)); // what older files hold
 
@@ -85,7 +86,7 @@ function checked([{ said: header }, ...chunks]) {
 function fits(event) {
   if (!Number.isInteger(event?.row)) return false;
   const { settings, path, lost = event.second_lost } = event;
-  if (settings !== undefined) return typeof settings === "object" && settings !== null;
+  if (settings !== undefined) return typeof settings === "object" && settings !== null && Object.values(settings).every((value) => SETTING.includes(typeof value));
   if (path !== undefined) return Array.isArray(path) && path.every((point) => point.length === 2 && point.every(Number.isFinite));
   return lost === null || typeof lost === "string";
 }

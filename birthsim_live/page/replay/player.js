@@ -1,8 +1,11 @@
 // Plays a recording, with the face of a connection.
 
 import { FIELDS, frameOf } from "../frame.js";
+import { checkedMessage } from "../worker/messages.js";
 
 const MOST = 1500; // frames for the plots of a whole recording
+const MESSAGES = ["pause", "speed", "seek"]; // of the others, such as those of a hand, a recording takes no notice
+const NUMBERS = { slowest: 0.01 };
 const NONE = { settings: {}, path: [], lost: null, second_lost: null };
 
 export class Player {
@@ -24,7 +27,9 @@ export class Player {
     cancelAnimationFrame(this.due);
   }
 
-  send({ type, paused, speed, time }) {
+  send(message) {
+    if (!MESSAGES.includes(message.type)) return true;
+    const { type, paused, speed, time } = checkedMessage(message, MESSAGES, this.hello, NUMBERS);
     if (type === "pause") {
       if (!paused && this.ended) this.position = 0;
       this.paused = paused;

@@ -3,14 +3,17 @@
 import { Clock } from "./clock.js";
 import { Device } from "./device.js";
 import { frameOf } from "./frames.js";
+import { checkedMessage } from "./messages.js";
 import { Recorder } from "./recorder.js";
 import { Session } from "./session.js";
 import { LEARNING, checked } from "./settings.js";
 
+const MESSAGES = ["drag", "push", "release", "device", "hidden", "learned", "set", "pause", "speed", "reset", "record"];
+
 export class Hub {
   /** `post` sends a message to the page. */
   constructor(pack, bundle, post) {
-    Object.assign(this, { pack, post });
+    Object.assign(this, { pack, post, device: null, hidden: false });
     this.session = new Session(pack, bundle);
     this.clock = new Clock(this.session, frameOf, (frame) => this.onFrame(frame));
     this.told = {};
@@ -27,9 +30,8 @@ export class Hub {
 
   async receive(message) {
     try {
-      const act = this[`on_${message.type}`];
-      if (!act) throw new Error(`${message.type} in a live session; allowed: drag, push, release, device, learned, set, pause, speed, reset, record`);
-      await act.call(this, message);
+      const { type } = checkedMessage(message, MESSAGES, this.pack.hello, this.pack.numbers);
+      await this[`on_${type}`](message);
       this.clock.touch();
     } catch (error) {
       this.post({ type: "error", message: error.message });
@@ -52,10 +54,16 @@ export class Hub {
   /** A haptic device is the hand, or is no longer. */
   on_device({ on }) {
     if (!on) this.device?.end();
-    else this.device ??= new Device(this, (reason) => {
+    else if (this.device) this.device.stay();
+    else this.device = new Device(this, (reason) => {
       this.device = null;
       if (reason) this.post({ type: "error", message: reason });
     });
+  }
+
+  /** Nobody sees the page, or somebody does again. */
+  on_hidden({ hidden }) {
+    this.hidden = hidden;
   }
 
   /** The controller that learns knows more; a rig that it lost begins anew. */
@@ -69,8 +77,6 @@ export class Hub {
   }
 
   on_speed({ speed }) {
-    const least = this.pack.numbers.slowest;
-    if (!(speed >= least && speed <= 1)) throw new Error(`speed = ${speed}; allowed: ${least} to 1 times real time`);
     this.clock.setSpeed(speed);
   }
 
@@ -103,6 +109,7 @@ export class Hub {
     const { session, clock } = this;
     const { recorder } = session;
     if (recorder?.full) this.endRecording().catch(({ message }) => this.post({ type: "error", message }));
+    this.device?.watch();
     if (performance.now() - this.heard > 1e3 * this.pack.numbers.patience) this.on_release();
     return {
       settings: { type: "settings", settings: session.shownSettings() },
@@ -113,7 +120,8 @@ export class Hub {
         recording: recorder && { file: recorder.name, seconds: Math.floor(recorder.seconds) },
         last_recording: this.lastRecording,
         dragging: session.hands.hold !== null,
-        device: Boolean(this.device),
+        device: Boolean(this.device && !this.device.leaving),
+        device_ignored: this.device?.ignored ?? null, // messages that say nothing: how many, and why the last
         duration: session.duration,
       },
       path: { type: "path", points: session.path() },

@@ -1,6 +1,18 @@
 // A controller that runs in Python (birthsim_live/server/controller.py): in each control period it is sent what is measured and
 // asked for, and answers with openings. The rig waits for it.
 
+import { shown } from "../refusal.js";
+
+const OPENINGS = 4;
+
+/** What Python has answered: four openings, or why there are none. */
+function answerIn(data) {
+  if (typeof data === "string") return { fault: data };
+  const openings = data.byteLength === OPENINGS * Float64Array.BYTES_PER_ELEMENT ? new Float64Array(data) : [];
+  const fits = openings.length === OPENINGS && openings.every((one) => Math.abs(one) <= 1);
+  return fits ? { openings } : { fault: `Python answers ${shown(Array.from(openings))}, ${data.byteLength} bytes; allowed: ${OPENINGS} openings from -1 to 1` };
+}
+
 export class Remote {
   /** `name` is that of a choice. A controller is made with each of these, and forgotten when it is closed. */
   constructor(name) {
@@ -11,7 +23,7 @@ export class Remote {
     this.socket = new WebSocket(place);
     this.socket.binaryType = "arraybuffer";
     this.made = new Promise((made) => ["open", "close"].forEach((kind) => this.socket.addEventListener(kind, made)));
-    this.socket.addEventListener("message", ({ data }) => this.settle(typeof data === "string" ? { fault: data } : { openings: new Float64Array(data) }));
+    this.socket.addEventListener("message", ({ data }) => this.settle(answerIn(data)));
     this.socket.addEventListener("close", () => this.settle({ fault: "Python has gone." }));
   }
 

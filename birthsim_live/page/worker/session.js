@@ -1,6 +1,7 @@
 // A rig that a person plays with, and one beside it to compare: control periods, no clock.
 
 import { INDEX, Loop, ROW } from "../rig/birthsim.js";
+import { Hands } from "./hands.js";
 import { putNetwork } from "./learned.js";
 import { Remote } from "./remote.js";
 import { LEARNING, NOTHING, STIFFNESSES, merged } from "./settings.js";
@@ -122,7 +123,7 @@ export class Session {
     const { loop, settings } = this;
     this.episode = 0;
     this.lost = null;
-        this.putScenario();
+    this.putScenario();
     this.putSensors();
     this.describeRig();
     for (const name of ["tick", "time", "begins", "sensors_begin"]) loop.set(name, 0);
@@ -271,29 +272,6 @@ export class Session {
 
   path() {
     return this.pack.scenarios[this.settings.scenario].path;
-  }
-}
-
-/** What the person's hand does, or null: { position, id } of a hand at a place, { force, id } of one that pushes. */
-class Hands {
-  constructor() {
-    this.hold = null;
-    this.used = null;
-  }
-
-  /** Do so from now on. */
-  act(session) {
-    const { position, force, id } = this.hold ?? {};
-    session.loop.set("pointer_held", Number(Boolean(position)));
-    if (position) session.fill("pointer_x", position);
-    session.fill("push_x", force ?? [0, 0]);
-    this.used = id ?? this.used;
-  }
-
-  /** Where the spring from `place` ends, or would end for a hand that pushes; nowhere where there is no hand. */
-  pointer(place, stiffness) {
-    const { position, force } = this.hold ?? {};
-    return position ?? place.map((value, k) => (force ? value + force[k] / stiffness : NaN));
   }
 }
 

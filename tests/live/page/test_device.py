@@ -8,15 +8,21 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
 
+from tests.work.test_side_by_side import waited_for
+
 PORT = 10001
 FAR = 0.03  # m to the right
+HIDDEN = """(value) => {
+    Object.defineProperty(document, "hidden", { value, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+}"""
 
 
 class Handle:
     """The service: says where the handle is, waits for a force, and says so again; ``answers`` are (s, N, N, N)."""
 
     def __init__(self):
-        self.place, self.answers = {"x": 0.1, "y": 0.0, "z": 0.2}, []
+        self.place, self.answers, self.odd = {"x": 0.1, "y": 0.0, "z": 0.2}, [], []
         try:
             self.server = serve(self.talk, "127.0.0.1", PORT)
         except OSError:
@@ -27,6 +33,9 @@ class Handle:
             while True:
                 begun = time.perf_counter()
                 device = {"device_id": "0A", "state": {"cursor_position": self.place}}
+                for words in self.odd:
+                    socket.send(words)
+                    socket.recv()
                 socket.send(json.dumps({"session_id": 1, "inverse3": [device]}))
                 (command,) = json.loads(socket.recv())["inverse3"]
                 assert command["device_id"] == "0A"
@@ -59,5 +68,17 @@ def test_a_handle_feels_the_rig(window):
         force = FAR / (1 / stiffness + 1 / spring)
         assert frame["force"][0] == pytest.approx(force, rel=0.02)
         assert handle.answers[-1][1:] == pytest.approx((-0.1 * force, 0.0, 0.0), rel=0.02, abs=0.05)
+        # Odd words are ignored, counted and shown.
+        handle.odd = ["null", '{"inverse3":[{"device_id":"0A","state":{"cursor_position":{"x":1e999,"y":0,"z":0}}}]}', b"\0\0"]
+        window.wait("birthsim.state.device_ignored.count > 10")
+        handle.odd = []
+        window.wait("/ignored$/.test(document.querySelector('#device').textContent)")
+        assert "allowed: " in window.value("document.querySelector('#notices').textContent")
+        assert window.value("Math.hypot(...birthsim.frame.velocity)") < 0.05
+        # Where nobody sees the page, the handle makes no force.
+        window.page.evaluate(HIDDEN, True)
+        waited_for(lambda: handle.answers[-1][1:] == (0, 0, 0))
+        window.page.evaluate(HIDDEN, False)
+        waited_for(lambda: handle.answers[-1][1] < -0.05 * force)
         button.click()
         window.wait("!birthsim.state.device && birthsim.frame.pointer === null")
