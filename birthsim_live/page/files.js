@@ -24,8 +24,8 @@ function save(content, name) {
 }
 
 export class Files {
-  /** `plots` are those of the page, `open(file)` plays a recording, `tell(words)` says what happened. */
-  constructor({ plots, open, tell }) {
+  /** `plots` are those of the page, `open(file)` plays a recording, `tell(words)` says what happened, `title()` what is shown. */
+  constructor({ plots, open, tell, title }) {
     const menu = byId("files");
     const opener = document.querySelector("[popovertarget=files]");
     menu.addEventListener("toggle", ({ newState }) => {
@@ -49,12 +49,12 @@ export class Files {
     });
     act("save-film", async () => {
       tell("Filming for 5 s: pull the head.");
-      save(await filmOf(document.querySelector(".view")), "birthsim.webm");
+      save(await filmOf(document.querySelector(".view"), undefined, title()), "birthsim.webm");
     });
     act("save-csv", () => save(new Blob([csvOf(plots.shown.history)], { type: "text/csv" }), "birthsim.csv"));
     act("save-png", async () => {
       plots.redraw();
-      save(await pictureOf(document.querySelector("main")), "birthsim.png");
+      save(await pictureOf(document.querySelector("main"), title()), "birthsim.png");
     });
     const choice = byId("choose");
     act("open-recording", () => choice.click());

@@ -3,13 +3,13 @@
 const LESSONS = [
   {
     name: "Feel the friction",
-    says: "Compressed air carries the head of a childbirth simulator, and a controller should make it feel like a spring. Pull it and hold: friction makes it shake by millimetres.",
+    says: "Compressed air carries the head of a childbirth simulator, and a controller should make it feel like a spring. Pull it and hold: the controller pushes against friction, and it shakes by millimetres.",
     settings: {},
     look: ".lens",
   },
   {
     name: "Take the friction away",
-    says: "Now the pistons slide freely, but the controller still pushes against the friction that it believes in: the head swings by a centimetre. Nobody knows friction exactly.",
+    says: "It shakes more, by a centimetre: the pistons slide freely, but the controller still pushes against the friction that it expects. One that expected none would hold still; nobody knows friction exactly.",
     settings: { friction: 0 },
     look: "[data-figure=error]",
   },

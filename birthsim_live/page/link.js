@@ -2,8 +2,22 @@
 
 import { STIFFNESSES } from "./worker/settings.js";
 
-export const EMBED = "embed"; // what an address says of the page itself
+const EMBED = "embed"; // what an address says of the page itself
+const NO = ["0", "false", "no"];
 const GAP = 500; // ms between changes of the address; browsers allow a hundred in half a minute
+
+/** Whether the address asks for the rig, its lens and its switch alone. */
+export function embedded() {
+  const asked = new URLSearchParams(location.search).get(EMBED);
+  return asked !== null && !NO.includes(asked.toLowerCase());
+}
+
+/** The address of the whole page. */
+export function wholePage() {
+  const search = new URLSearchParams(location.search);
+  search.delete(EMBED);
+  return `${location.pathname}?${search}`;
+}
 
 /** The settings that an address asks for; what is no setting, or cannot be read as one, is refused by the rig, by name. */
 export function settingsIn(search, defaults) {
@@ -22,7 +36,7 @@ function read(text, type) {
 function searchOf(settings, defaults) {
   const given = settings.stiffness_source === "scenario" ? STIFFNESSES : [];
   const names = Object.keys(defaults).filter((name) => settings[name] !== defaults[name] && !given.includes(name));
-  const kept = new URLSearchParams(location.search).has(EMBED) ? [[EMBED, "1"]] : [];
+  const kept = embedded() ? [[EMBED, "1"]] : [];
   const all = [...kept, ...names.map((name) => [name, settings[name]])];
   return all.length ? `?${new URLSearchParams(all)}` : "";
 }

@@ -2,12 +2,13 @@
 // Two rigs share the picture: each head is seen from its own compliant target, so that their errors can be compared.
 
 import * as pen from "./pen.js";
-import { Axis, Pen, finite } from "./pen.js";
+import { Axis, Pen, finite, widthOf } from "./pen.js";
 import { Sheet } from "./sheet.js";
 import { Trail } from "./trail.js";
 
 const WINDOWS = [0.01, 0.02, 0.04, 0.08, 0.16]; // widths the lens may show, m
-const EDGE = 0.42; // of the width: so far from the middle is the end effector still well inside
+const EDGE = 0.42; // of the width: so far beside the middle is the end effector still well inside
+const SMALL = 150; // px; a lens that is smaller has no room for the errors of two rigs
 const MOST = 0.8; // of the errors
 const RIM = 3; // px
 
@@ -34,10 +35,13 @@ export class Magnifier {
     rigsOf(frame).forEach((one, k) => this.trails[k].push(frame.time, errorOf(one)));
   }
 
-  /** The window holds most errors of as long as the trail lasts: a jump of the hand leaves it, and comes back. */
+  /** The window holds most errors of as long as the trail lasts, clear of the words: a jump of the hand leaves it, and comes back. */
   fit(frame) {
-    const offset = Math.max(...rigsOf(frame).map((_, k) => this.trails[k].reach(MOST)));
-    this.window = WINDOWS.find((window) => offset <= EDGE * window) ?? WINDOWS.at(-1);
+    const { height } = this.sheet;
+    const { foot } = this.errorsOf(frame, []);
+    const rooms = [EDGE, height ? Math.min(EDGE, 0.5 - foot / height) : EDGE];
+    const least = Math.max(...rigsOf(frame).map((_, k) => this.trails[k].reach(MOST, rooms)));
+    this.window = WINDOWS.find((window) => least <= window) ?? WINDOWS.at(-1);
   }
 
   /** `mainScale` is that of the main view, px/m; `means` are what is written of the rigs (means.js). */
@@ -87,13 +91,29 @@ export class Magnifier {
       this.pointOut(world, centre, place, colour);
     }
     this.drawScale(world, step);
-    rigsOf(frame).forEach((_, k) => {
-      const error = means[k]?.error_mm;
-      if (!Number.isFinite(error)) return;
-      const look = { colour: [pen.FORCE, beside][k], weight: 700, size: Math.max(12, 0.06 * width) };
-      world.text(`error ${error.toFixed(2)} mm`, [width / 2, (second ? 0.19 : 0.14) * height + 1.25 * look.size * k], look);
+    this.errorsOf(frame, means).lines.forEach(({ words, y, size }, k) => {
+      if (words) world.text(words, [width / 2, y], { colour: [pen.FORCE, beside][k], weight: 700, size });
     });
     this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
+  }
+
+  /** The errors that are written, in the upper part of the lens: `lines` of { words, y, size }, px, and where they end. */
+  errorsOf(frame, means) {
+    const { width, height } = this.sheet;
+    const size = Math.max(12, 0.06 * width);
+    const rigs = rigsOf(frame);
+    if (rigs.length > 1 && width < SMALL) return { lines: [], foot: 0 };
+    const first = Math.max((rigs.length > 1 ? 0.19 : 0.14) * height, 1.5 * size);
+    const lines = rigs.map((_, k) => {
+      const y = first + 1.25 * size * k;
+      const error = means[k]?.error_mm;
+      if (!Number.isFinite(error)) return { words: "", y, size };
+      const top = y - 0.6 * size;
+      const chord = 2 * Math.sqrt(top * (height - top)) - 2 * RIM;
+      const shorter = [`error ${error.toFixed(2)} mm`, `${error.toFixed(2)} mm`, `${error.toFixed(0)} mm`];
+      return { words: shorter.find((words) => widthOf(words, { weight: 700, size }) <= chord) ?? "", y, size };
+    });
+    return { lines, foot: lines.at(-1).y + 0.6 * size };
   }
 
   drawDashed(world, points, colour) {

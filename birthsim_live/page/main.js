@@ -3,6 +3,7 @@
 import { About } from "./about.js";
 import { Challenge } from "./challenge.js";
 import { DEEPER, PLOTS, RMS, UNITS, rowOf } from "./curves.js";
+import { inWords } from "./described.js";
 import { Files } from "./files.js";
 import { Gamepad } from "./gamepad.js";
 import { Gauges } from "./gauges.js";
@@ -26,6 +27,7 @@ import { Source } from "./source.js";
 import { explain } from "./terms.js";
 import { Transport } from "./transport.js";
 import { Views } from "./views.js";
+import { sifted } from "./worker/settings.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -141,7 +143,9 @@ function setUpSettings(message) {
   guide.setUp(message);
   if (!link.defaults) {
     const wished = settingsIn(location.search, message.defaults);
-    if (Object.keys(wished).length) change(wished);
+    const { allowed, refusals } = sifted(wished, message);
+    refusals.forEach((words) => notices.show(words));
+    if (Object.keys(allowed).length) change(allowed);
   }
   link.setUp(message.defaults);
 }
@@ -191,6 +195,12 @@ function pixel(point, k = 0) {
   return [box.left + x, box.top + y];
 }
 
+/** What pictures and films are of. */
+function title() {
+  const { mode, words, state } = { ...rig.hello, state: rig.state };
+  return [`BirthSIM ${words.version}`, mode === "live" ? "" : state.file, inWords(rig.settings, rigs.titles)].filter(Boolean).join(" · ");
+}
+
 let drawn = null;
 
 /** The newest frame is drawn as it came; nothing is made up between frames. */
@@ -201,7 +211,7 @@ function draw(now) {
   if (frame !== drawn || !rig.connected) {
     drawn = frame;
     magnifier.draw(frame, rigs.scenes[0].pen.scale, means.shown);
-    rigs.draw(frame, magnifier);
+    rigs.draw(frame, magnifier, means.shown);
     rig.monitor.drew(frame);
     for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost.replace(/[.]?$/, ".")} Press R to reset.` : "");
   }
@@ -218,7 +228,7 @@ function draw(now) {
   if (rig.connected && written) readouts.step(written, running[k], frame, state, now);
 }
 
-new Files({ plots, open: (file) => source.open(file), tell: (words) => notices.show(words) });
+new Files({ plots, open: (file) => source.open(file), tell: (words) => notices.show(words), title });
 byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);

@@ -153,6 +153,11 @@ export class Pen {
 }
 
 const PLAIN = { size: 12, weight: 600, align: "center" };
+/** How wide words are, px, with their rim. */
+export function widthOf(words, look) {
+  return lettered(words, { colour: INK, ...PLAIN, ...look }).width;
+}
+
 const MOST_TEXTS = 500;
 const texts = new Map();
 

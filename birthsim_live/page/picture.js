@@ -3,8 +3,10 @@
 const LEFT_OUT = ".settings, .under, .hint, .banner, .scrubber, .unseen, .handle, script, style";
 const PAINTED = ".readouts, .physics";
 
-/** A PNG of what can be seen of an element, as a Blob. */
-export function pictureOf(element) {
+export const HEAD = 24; // px of the line above that says what is shown
+
+/** A PNG of what can be seen of an element, below its `title`, as a Blob. */
+export function pictureOf(element, title) {
   const ratio = Math.min(window.devicePixelRatio || 1, 3);
   const parts = [...element.children].flatMap((child) => (child.matches(".fold") ? [...child.children] : child));
   const inside = parts.filter((part) => part.offsetParent && !part.matches(LEFT_OUT)).map((part) => part.getBoundingClientRect());
@@ -12,10 +14,11 @@ export function pictureOf(element) {
   const [right, bottom] = [Math.max(...inside.map((box) => box.right)), Math.max(...inside.map((box) => box.bottom))];
   const picture = document.createElement("canvas");
   picture.width = Math.round((right - left) * ratio);
-  picture.height = Math.round((bottom - top) * ratio);
+  picture.height = Math.round((bottom - top + HEAD) * ratio);
   const context = picture.getContext("2d");
   context.scale(ratio, ratio);
-  context.translate(-left, -top);
+  writeHead(context, title, right - left);
+  context.translate(-left, HEAD - top);
   context.fillStyle = getComputedStyle(document.body).backgroundColor;
   context.fillRect(left, top, right - left, bottom - top);
   const shown = [...element.querySelectorAll("*")].filter((one) => one.checkVisibility() && !one.closest(LEFT_OUT));
@@ -26,6 +29,18 @@ export function pictureOf(element) {
     else for (const node of one.childNodes) if (node.nodeType === Node.TEXT_NODE) write(context, node);
   }
   return new Promise((resolve) => picture.toBlob(resolve, "image/png"));
+}
+
+/** One line across `width`, px, at the top. */
+export function writeHead(context, title, width) {
+  const look = getComputedStyle(document.body);
+  context.fillStyle = look.backgroundColor;
+  context.fillRect(0, 0, width, HEAD);
+  context.font = `600 13px ${look.fontFamily}`;
+  context.fillStyle = look.color;
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  context.fillText(title, 10, HEAD / 2, width - 20);
 }
 
 function paint(context, element) {

@@ -90,13 +90,13 @@ export class Rigs {
     for (const scene of this.scenes) scene.cue = false;
   }
 
-  /** `lens` is what the lens shows: its `window`, m, and its canvas. */
-  draw(frame, lens) {
+  /** `lens` is what the lens shows: its `window`, m, and its canvas; `means` are what is written of the rigs (means.js). */
+  draw(frame, lens, means) {
     const two = frame.second ? "2" : "1";
     if (document.body.dataset.rigs !== two) document.body.dataset.rigs = two;
     const [first, second] = this.scenes;
-    first.draw(frame, this.hand.held, lens, second.hidden ? frame.second : null);
-    if (frame.second) second.draw(frame.second, this.hand.held, lens, null);
+    first.draw(frame, { held: this.hand.held, lens, ghost: second.hidden ? frame.second : null, mean: means[0] });
+    if (frame.second) second.draw(frame.second, { held: this.hand.held, lens, ghost: null, mean: means[1] });
   }
 
   /** Called with each frame of the screen: the captions of two from their means (means.js); `rms` are running errors, mm. */

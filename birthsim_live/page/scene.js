@@ -125,9 +125,9 @@ export class Scene {
 
   /**
    * `held` is the offset, m, from end effector to the place where this window holds it, or null; `lens` a magnifier;
-   * `ghost` a frame of another rig whose head is to be seen here, or null.
+   * `ghost` a frame of another rig whose head is to be seen here, or null; `mean` what is written of this one (means.js).
    */
-  draw(frame, held, lens, ghost) {
+  draw(frame, { held, lens, ghost, mean }) {
     if (!this.pen || this.hidden) return;
     this.sheet.check();
     const { pen: world, unit, geometry } = this;
@@ -147,11 +147,11 @@ export class Scene {
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
     pen.compliantMarker(world, frame.compliant, 1.35 * size);
-    const label = pose && this.drawForce(frame, pose, this.hand(frame, held ?? [0, 0]));
+    const label = pose && this.drawForce(frame, mean ?? frame, pose, this.hand(frame, held ?? [0, 0]));
     if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
     pen.endEffectorMarker(world, frame.position, 0.75 * size);
     if (pose && "lab" in document.body.dataset) this.drawNames(pose);
-    if (this.cue && pose && !frame.pointer && document.body.dataset.mode === "live") this.drawCue(frame);
+    if (this.cue && pose && !label && !frame.pointer && document.body.dataset.mode === "live") this.drawCue(frame);
     if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
     this.drawNote(noteOf(frame, geometry));
   }
@@ -221,10 +221,10 @@ export class Scene {
   }
 
   /**
-   * Arrow of the user's force at the head, or beyond the `hand` where that pulls the same way; returns the arrow's label and
-   * where that belongs, px.
+   * Arrow of the user's force at the head, or beyond the `hand` where that pulls the same way; returns the arrow's label, which
+   * has the `mean` that is written elsewhere, and where that belongs, px.
    */
-  drawForce({ force: [fx, fy], drag_force: drag }, pose, hand) {
+  drawForce({ force: [fx, fy], drag_force: drag }, mean, pose, hand) {
     const newtons = Math.hypot(fx, fy);
     if (!(newtons > LEAST_FORCE && Number.isFinite(newtons))) return null;
     const { unit } = this;
@@ -234,8 +234,9 @@ export class Scene {
     const along = hand ? dx * hand[0] + dy * hand[1] : 0;
     const start = hand && Math.abs(dx * hand[1] - dy * hand[0]) < 0.5 * along ? Math.max(edge, along + 9) : edge;
     const length = unit * Math.min(14 + 0.8 * newtons, 110);
-    const most = Math.hypot(...drag) > this.limit - 0.5 ? ", the most" : "";
-    const words = `${newtons < 1e5 ? newtons.toFixed(0) : newtons.toExponential(1)} N${most}`;
+    const written = Math.hypot(...mean.force);
+    const most = Math.hypot(...drag) > this.limit - 0.5 && Math.abs(written - newtons) < 0.5 ? ", the most" : "";
+    const words = `${written < 1e5 ? written.toFixed(0) : written.toExponential(1)} N${most}`;
     const half = [4.2 * words.length + 4, 9];
     const inside = (at, room) =>
       at[0] > room[0] && at[0] < this.sheet.width - room[0] && at[1] > room[1] && at[1] < this.sheet.height - STRIP - room[1];

@@ -23,9 +23,9 @@ export class Trail {
     while (this.points[0].time < time - SPAN) this.points.shift();
   }
 
-  /** How far, m, a share of its points lies from zero at most, along either axis. */
-  reach(share) {
-    const far = this.points.flatMap(({ point }) => (finite(point) ? [Math.max(...point.map(Math.abs))] : []));
+  /** How wide, m, a window must be to hold a share of its points: `rooms` are shares of its width, beside the middle and above. */
+  reach(share, rooms) {
+    const far = this.points.flatMap(({ point }) => (finite(point) ? [Math.max(...point.map((value, k) => Math.abs(value) / rooms[k]))] : []));
     return far.sort((a, b) => a - b)[Math.floor(share * far.length)] ?? 0;
   }
 

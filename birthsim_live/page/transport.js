@@ -1,6 +1,6 @@
 // Pause, reset, slow motion, recording; of a replay its file, settings and scrubber.
 
-import { STIFFNESSES } from "./worker/settings.js";
+import { inWords } from "./described.js";
 
 const byId = (id) => document.getElementById(id);
 const SLOW = 0.85; // of real time
@@ -73,19 +73,29 @@ export class Transport {
     if (this.replay) {
       this.scrub.max = this.duration = state.duration;
       byId("file").textContent = state.file;
-    } else this.showRecording(state);
+    } else {
+      this.showDevice(state);
+      this.showRecording(state);
+    }
   }
 
   /** The settings of a replay at its present instant, in words. */
   showSettings(settings) {
-    const words = ["scenario", "controller", "valves", "sensors"].filter((name) => settings[name]).map((name) => settings[name].replaceAll("_", " "));
-    const numbers = STIFFNESSES.filter((name) => settings[name]).map((name) => `${name} ${settings[name]} N/m`);
-    const rig = settings.mass ? [`mass ${settings.mass} kg`, `friction × ${settings.friction}`] : [];
-    byId("played").textContent = [...words, ...numbers, ...rig].join(" · ");
+    byId("played").textContent = inWords(settings);
   }
 
-  showRecording({ recording, last_recording: last, device }) {
-    byId("device").setAttribute("aria-pressed", String(device));
+  /** Whether a haptic device is the hand, and how much of what it says is ignored. */
+  showDevice({ device, device_ignored: ignored }) {
+    const button = byId("device");
+    button.setAttribute("aria-pressed", String(device));
+    const { count = 0, why } = ignored ?? {};
+    button.textContent = count ? `Haptic device, ${count} ignored` : "Haptic device";
+    button.title = count ? `${count} messages of the device ignored; the last: ${why}` : "A Haply Inverse3 is the hand";
+    if (count && !this.ignored) this.tell(`The device says what is ignored: ${why}`);
+    this.ignored = count;
+  }
+
+  showRecording({ recording, last_recording: last }) {
     const record = byId("record");
     record.setAttribute("aria-pressed", String(Boolean(recording)));
     record.querySelector("span").textContent = recording ? `Stop, ${recording.seconds.toFixed(0)} s` : "Record";

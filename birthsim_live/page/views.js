@@ -1,7 +1,7 @@
 // What of the page is in sight: the story alone, with its lab, or, embedded in another page, the rig and its switch alone.
 
 import { foldable } from "./fold.js";
-import { EMBED } from "./link.js";
+import { embedded, wholePage } from "./link.js";
 
 const LAB = "#lab";
 
@@ -11,13 +11,12 @@ export class Views {
     this.button = document.getElementById("open-lab");
     this.button.addEventListener("click", () => this.toggle());
     this.choices = [...document.querySelectorAll("[name=under]")];
+    this.other = document.getElementById("choose-other");
     for (const choice of this.choices) choice.addEventListener("change", () => change({ controller: choice.value }));
-    if (new URLSearchParams(location.search).has(EMBED)) this.embed(pause);
+    if (embedded()) this.embed(pause);
     const whole = document.getElementById("whole");
     whole.addEventListener("click", () => {
-      const search = new URLSearchParams(location.search);
-      search.delete(EMBED);
-      whole.href = `${location.pathname}?${search}`;
+      whole.href = wholePage();
     });
     foldable(document.getElementById("fold"), document.getElementById("handle"));
     addEventListener("hashchange", () => this.open(location.hash === LAB));
@@ -31,7 +30,8 @@ export class Views {
   }
 
   /** A recording is looked at in the lab. */
-  setUp({ mode }) {
+  setUp({ mode, choices }) {
+    this.titles = Object.fromEntries(choices.controller.map(({ name, title }) => [name, title]));
     this.open(mode !== "live" || location.hash === LAB);
   }
 
@@ -46,8 +46,14 @@ export class Views {
     this.button.setAttribute("aria-expanded", String(wanted));
   }
 
-  /** Which of the two controllers of the switch it is, if it is one of them. */
+  /** Which controller of the switch it is; one that is not there takes its last place. */
   show({ controller }) {
+    const [input, words] = this.other.children;
+    if (!this.choices.some((choice) => choice !== input && choice.value === controller)) {
+      input.value = controller;
+      words.textContent = this.titles[controller] ?? controller;
+      this.other.hidden = false;
+    }
     for (const choice of this.choices) choice.checked = choice.value === controller;
   }
 }

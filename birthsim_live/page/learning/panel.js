@@ -8,6 +8,8 @@ const ALONE = { scenario: "probe", scenario_force: false }; // the visitor's han
 const RANGE = [0.1, 100]; // mm, on a logarithmic scale
 const SMOOTH = 9; // updates of which a median is shown
 
+const written = (value) => (Number.isFinite(value) ? value.toFixed(1) : "–");
+
 export class Learning {
   /** `send` tells the rig what has been learned, `change` asks it for settings, `tell` says what fails. */
   constructor({ send, change, tell }) {
@@ -79,7 +81,7 @@ export class Learning {
     button.textContent = done ? "Pull it yourself" : wanted ? "Stop" : errors.length ? "Go on" : "Learn it here";
     button.disabled = done && Object.entries(ALONE).every(([name, value]) => this.settings[name] === value);
     words.setAttribute("aria-live", done ? "polite" : "off"); // else screen readers would never end
-    const now = `${this.seconds.toFixed(0)} s on 32 rigs at once: off by ${this.last().toFixed(1)} mm`;
+    const now = `${this.seconds.toFixed(0)} s on 32 rigs at once: off by ${written(this.last())} mm`;
     const begun = errors.length ? `${now}.` : "Nothing learned yet: the valves stay shut.";
     words.textContent = done ? `Learned in ${now}. Pull the head: it gives way as a spring does.` : begun;
   }
