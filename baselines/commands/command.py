@@ -3,7 +3,9 @@
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NoReturn, TypeVar
 
 from cyclopts import App, ArgumentCollection, Parameter
@@ -92,7 +94,9 @@ def act(name: str, action: Callable[[], None]) -> None:
 
     before = {number: signal.signal(number, end) for number in words}
     try:
-        action()
+        with warnings.catch_warnings():
+            warnings.showwarning = partial(_warn, name, warnings.showwarning)
+            action()
     except KeyboardInterrupt as error:
         number, said = error.number if isinstance(error, Ended) else int(signal.SIGINT), True
         _say(name, words[number], 128 + number)
@@ -107,6 +111,14 @@ def act(name: str, action: Callable[[], None]) -> None:
         if not came:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def _warn(name: str, before: Callable[..., None], message: Warning | str, category: type[Warning], *where: Any) -> None:
+    """What a user should know in one line, as errors are, without the line of source code; other warnings as they come."""
+    if category is UserWarning:
+        print(f"{name}: warning: {message}", file=sys.stderr)
+    else:
+        before(message, category, *where)
 
 
 def _problem(error: Exception) -> str:

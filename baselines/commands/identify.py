@@ -9,10 +9,11 @@ from typing import Annotated
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from baselines.commands.settings import CONTROLLER, WORLD, Configured, Kind, RigFile, Seed, number
+from baselines.commands.settings import CONTROLLER, WORLD, Configured, Kind, RigFile, Seed, number, whole
 from baselines.identification.experiment import propose, read_plan
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
+from baselines.identification.log_columns import LogOptions
 from baselines.identification.log_file import read_trial, write_trial
 from baselines.identification.quantities import unmeasured
 from baselines.logs.writing import WRITERS
@@ -23,6 +24,12 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 DURATION = 12.0
 """s of a proposed experiment; the table of docs/identify.md is made with as much."""
 
+ONLY_WITH = {
+    **{"duration": "propose", "controller": "simulate", "sensors": "simulate"},
+    **dict.fromkeys(("report", "columns", "skip", "decimal_comma"), "log"),
+}
+"""Option -> the one of log, propose and simulate that it belongs to."""
+
 
 @dataclass(kw_only=True)
 class Settings(Configured):
@@ -31,7 +38,13 @@ class Settings(Configured):
     """
 
     log: Annotated[Path | None, Parameter(metavar="FILE")] = field(default=None, kw_only=False)
-    """.csv, .parquet or .mcap: time, openings, pressures, positions, forces."""
+    """.csv, .parquet, .mcap or .mat: time, openings, pressures, positions, forces."""
+    columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
+    """What columns of the log are called, such as force_x=Fz,force_y=none."""
+    skip: Annotated[int | None, whole(0)] = None
+    """Lines of the log before its heading, where it is not found by itself."""
+    decimal_comma: bool = False
+    """The log has decimal commas."""
     propose: Annotated[Path | None, Parameter(metavar="PLAN")] = None
     """Write an experiment as CSV: target, and openings to add."""
     simulate: Annotated[Path | None, Parameter(metavar="PLAN")] = None
@@ -56,9 +69,11 @@ def main(settings: Settings) -> None:
     asked = [name for name in ("log", "propose", "simulate") if getattr(settings, name) is not None]
     if len(asked) != 1:
         raise ValueError(f"{' and '.join(asked) or 'nothing'} given; allowed: one of LOG, --propose PLAN, --simulate PLAN")
-    for name, needed in (("duration", "propose"), ("controller", "simulate"), ("sensors", "simulate"), ("report", "log")):
-        if getattr(settings, name) is not None and asked != [needed]:
-            raise ValueError(f"--{name} is given; allowed with {'LOG' if needed == 'log' else f'--{needed}'} only")
+    for name, needed in ONLY_WITH.items():
+        value = getattr(settings, name)
+        if value is not None and value is not False and asked != [needed]:
+            option = name.replace("_", "-")
+            raise ValueError(f"--{option} is given; allowed with {'LOG' if needed == 'log' else f'--{needed}'} only")
     rig = load_parameters(settings.parameters)
     if settings.log is not None:
         _from_log(settings, settings.log, rig)
@@ -89,7 +104,7 @@ def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:
 
 def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
     out = _out(settings, (".toml",))
-    trial = read_trial(log, owner)
+    trial = read_trial(log, owner, LogOptions(settings.columns or "", settings.skip, settings.decimal_comma))
     folder = None if settings.report is None else make_folder(settings.report)
     with _bar(None, "fit", "evaluations") as tick:
         found = identify(trial, owner, settings.seed, tick=tick)

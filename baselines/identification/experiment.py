@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.logs.table import read_csv
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector, inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
+from birthsim_env.tables.columns import columns
 
 GRID = 0.01
 """s between the rows of a plan."""
@@ -36,8 +36,9 @@ STEP = 0.3
 HELD = (2, 8)
 """Shortest and longest time for which an added opening is held, in rows of the plan."""
 
-NAMES = ("time", "x", "y", "added_P1", "added_N1", "added_P2", "added_N2")
-"""Columns of a plan: s, m, m, and openings in [-1, 1] that are added to the law's."""
+ADDED = ("added_P1", "added_N1", "added_P2", "added_N2")
+NAMES = {"time": "s", "x": "m", "y": "m", **dict.fromkeys(ADDED, "1")}
+"""Columns of a plan and their units; the last four are openings in [-1, 1] that are added to the law's."""
 
 SHORTEST, LONGEST = 4.0, 600.0
 """s of a plan."""
@@ -85,12 +86,10 @@ def _steps(rows: int, rng: np.random.Generator) -> Array:
 
 def read_plan(path: Path, rig: Parameters) -> Plan:
     """The plan that ``Plan.write`` wrote; ``ValueError`` names what is wrong with the file, also for this rig."""
-    table = read_csv(path)
-    columns = np.array([table.column(name) for name in NAMES])
-    times, target, added = columns[0], columns[1:3], columns[3:]
-    where = f"plan = {str(path)!r}"
-    if len(times) < 8 or not np.isfinite(columns).all() or not (np.diff(times) > 0).all():
-        raise ValueError(f"{where}; allowed: at least 8 rows of finite numbers with increasing times")
+    where, found = f"plan = {str(path)!r}", columns("plan", (path, ""), NAMES, tuple(NAMES)).T
+    times, target, added = found[0], found[1:3], found[3:]
+    if len(times) < 8:
+        raise ValueError(f"{where} has {len(times)} rows; allowed: at least 8")
     if not SHORTEST <= times[-1] - times[0] <= LONGEST:
         raise ValueError(f"{where} lasts {times[-1] - times[0]:.4g} s; allowed: {SHORTEST:g} to {LONGEST:g} s")
     if np.abs(added).max() > 1:

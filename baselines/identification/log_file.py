@@ -4,31 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
+from baselines.identification.log_columns import COLUMNS, FORCES, OPENINGS, POSITIONS, PRESSURES, LogOptions, read_columns
 from baselines.identification.trial import Trial
-from baselines.logs.log import Column, Log, Series
-from baselines.logs.table import Table, read_table
+from baselines.logs.log import Log, Series
 from baselines.logs.writing import WRITERS, write_log
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
-
-CHAMBERS = ("P1", "N1", "P2", "N2")
-OPENINGS = tuple(f"openings_{chamber}" for chamber in CHAMBERS)
-PRESSURES = tuple(f"pressures_{chamber}" for chamber in CHAMBERS)
-POSITIONS = ("position_x", "position_y")
-FORCES = ("force_x", "force_y")
-COLUMNS = {
-    "time": Column("s", "time; rows are evenly spaced"),
-    **{name: Column("1", "opening commanded of the chamber's valve, -1 to 1, held until the next row") for name in OPENINGS},
-    **{name: Column("Pa", "absolute pressure of the chamber") for name in PRESSURES},
-    **{name: Column("m", "position of the end effector, as the tracker last showed it") for name in POSITIONS},
-    **{name: Column("N", "force of the hand on the end effector; 0 where there is none") for name in FORCES},
-}
-"""What a log holds; forces may be missing."""
-
-RECORDED = ("scenario_force", "drag_force")
-"""Columns of a recording that together are the force of the hand."""
 
 SHORTEST = 2.0
 """s of a log."""
@@ -46,44 +29,25 @@ OUTSIDE = 0.005
 """m that a noisy position may lie outside of the workspace."""
 
 
-def read_trial(path: Path, rig: Parameters) -> Trial:
+def read_trial(path: Path, rig: Parameters, options: LogOptions = LogOptions()) -> Trial:  # noqa: B008  frozen
     """The trial that a log holds; ``rig`` gives the workspace and the atmosphere. ``ValueError`` in one line for a bad log."""
-    table = read_table(path)
-    times = "time" if "time" in table.columns else "log_time"
-    needed = (times, *OPENINGS, *PRESSURES, *POSITIONS)
-    missing = [name.replace("log_time", "time") for name in needed if name not in table.columns]
-    if missing:
-        raise ValueError(f"{table.source} lacks {', '.join(missing)}; there are: {', '.join(table.columns) or 'none'}")
-    forces = _forces(table)
-    for name in needed:
-        _check_finite(table, name, table.columns[name])
-    rows = {name: table.columns[name] for name in needed}
-    _check_times(table.source, rows[times])
-    openings, pressures, positions = (np.array([rows[name] for name in group]) for group in (OPENINGS, PRESSURES, POSITIONS))
-    _check_openings(table.source, openings)
-    _check_pressures(table.source, pressures, rig)
-    _check_positions(table.source, positions, rig)
-    even = np.linspace(rows[times][0], rows[times][-1], len(rows[times]))
+    source, rows = read_columns(path, options)
+    for name, values in rows.items():
+        _check_finite(source, name, values)
+    _check_times(source, rows["time"])
+    groups = (OPENINGS, PRESSURES, POSITIONS, FORCES)
+    openings, pressures, positions, forces = (np.array([rows[name] for name in group]) for group in groups)
+    _check_openings(source, openings)
+    _check_pressures(source, pressures, rig)
+    _check_positions(source, positions, rig)
+    even = np.linspace(rows["time"][0], rows["time"][-1], len(rows["time"]))
     return Trial(even, openings, pressures, positions, forces)
 
 
-def _forces(table: Table) -> Array:
-    rows = len(next(iter(table.columns.values())))
-    total = np.zeros((2, rows))
-    if FORCES[0] in table.columns or FORCES[1] in table.columns:
-        total = np.array([table.column(name) for name in FORCES])
-    else:
-        for name in RECORDED:
-            if f"{name}_x" in table.columns and f"{name}_y" in table.columns:
-                total = total + np.array([table.columns[f"{name}_x"], table.columns[f"{name}_y"]])
-    _check_finite(table, "the force", total.sum(axis=0))
-    return total
-
-
-def _check_finite(table: Table, name: str, values: Array) -> None:
+def _check_finite(source: str, name: str, values: Array) -> None:
     if not np.isfinite(values).all():
         row = int(np.argmin(np.isfinite(values)))
-        raise ValueError(f"{table.source}, row {row}: {name} = {values[row]:g}; allowed: finite numbers in every row")
+        raise ValueError(f"{source}, row {row}: {name} = {values[row]:g}; allowed: finite numbers in every row")
 
 
 def _check_times(source: str, times: Array) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.loop.signals import Motion
-from birthsim_env.parts.columns import columns, csv_file
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Trajectory
@@ -21,6 +20,7 @@ from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.values import is_finite, problem, shown
+from birthsim_env.tables.columns import columns, table_file
 
 COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
 FORCE = {"time": "s", "Fx": "N", "Fy": "N"}
@@ -184,7 +184,7 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
     Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
     """
     expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
-    if file := csv_file(reference):
+    if file := table_file(reference):
         rows = columns("reference", file, COURSE, ("time", "x", "y"))
         return Through(rows[:, 0], rows[:, 1:])
     reference = _made("reference", reference, Trajectory, expected)
@@ -201,7 +201,7 @@ def stiffness_of(stiffness: Any) -> StiffnessSchedule:
     Raises ``ValueError`` in one line for what is none of these: such a schedule, a number (N/m, of both axes for all time), a
     CSV file of time, x, y, stiffness.
     """
-    if file := csv_file(stiffness):
+    if file := table_file(stiffness):
         rows = columns("stiffness", file, COURSE, ("time", "stiffness"))
         return stepped(rows[:, 0], rows[:, 1])
     if is_finite(stiffness):
@@ -223,7 +223,7 @@ def hand_of(user_force: Any, varied: bool) -> UserForce:
     expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
     if isinstance(user_force, (str, Path)) and str(user_force) in HANDS:
         return HANDS[str(user_force)][varied]()
-    if file := csv_file(user_force):
+    if file := table_file(user_force):
         rows = columns("user_force", file, FORCE, tuple(FORCE))
         return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])
     user_force = _made("user_force", user_force, UserForce, expected)

@@ -9,8 +9,8 @@ import pytest
 from baselines.commands.worlds import with_options
 from baselines.registry import known_options, split_options
 from birthsim_env import Circle, UserForce
-from birthsim_env.parts.columns import columns, csv_file
 from birthsim_env.parts.own_parts import COURSE, FORCE, Through, trajectory_of
+from birthsim_env.tables.columns import columns, table_file
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -121,16 +121,16 @@ PUSH = {
 @pytest.mark.parametrize(("text", "names"), PUSH.values(), ids=PUSH)
 def test_a_heading_names_the_columns_in_any_order(text, names, tmp_path):
     (tmp_path / "push.csv").write_text(text, encoding="utf-8")
-    found = columns("user_force", csv_file(f"{tmp_path}/push.csv{names}"), FORCE, tuple(FORCE))
+    found = columns("user_force", table_file(f"{tmp_path}/push.csv{names}"), FORCE, tuple(FORCE))
     np.testing.assert_array_equal(found, [[0.0, 1.0, -2.0], [1.0, 3.0, -4.0]])
 
 
 def test_a_stiffness_needs_no_course_beside_it_once_it_is_named(tmp_path):
     (tmp_path / "own.csv").write_text("stiffness,time\n1000,0\n2000,1\n", encoding="utf-8")
-    file = csv_file(tmp_path / "own.csv")
+    file = table_file(tmp_path / "own.csv")
     np.testing.assert_array_equal(columns("stiffness", file, COURSE, ("time", "stiffness")), [[0, 1000], [1, 2000]])
-    assert csv_file("own.py:Name") is None
-    assert csv_file(3.0) is None
+    assert table_file("own.py:Name") is None
+    assert table_file(3.0) is None
 
 
 def test_a_hand_of_a_file_pushes_as_it_says_between_its_rows_too(tmp_path):

@@ -1,5 +1,6 @@
 """Files that a user wrote: read whole where they are small, refused by name where they are not what they should be."""
 
+import codecs
 import json
 import tomllib
 from collections.abc import Callable
@@ -8,6 +9,8 @@ from typing import Any
 
 LARGEST = 4 * 2**20
 """Bytes of a file of settings or numbers; a rig takes 2 kB, an hour of a trajectory at 10 ms 8 MB less its digits."""
+
+NO_TEXT = "bytes that are no text"
 
 
 def named(path: str | Path) -> str:
@@ -30,10 +33,44 @@ def read(name: str, path: str | Path, most: int = LARGEST) -> bytes:
     return content
 
 
+def encoding_of(content: bytes) -> str:
+    """The encoding of a text by its byte-order mark and its bytes: ``UTF-8``, with or without a mark, ``UTF-16`` and ``UTF-32``
+    with one, ``UTF-16 without a byte-order mark``, ``Windows-1252`` for other text, ``NO_TEXT``."""
+    marks = {"UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE), "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)}
+    for name, begins in marks.items():
+        if content.startswith(begins):
+            return name
+    if b"\0" in content[:LARGEST]:
+        halves = content[:2000:2], content[1:2000:2]
+        every_other = any(half.count(0) > 0.9 * len(half) for half in halves) and not all(0 in half for half in halves)
+        return "UTF-16 without a byte-order mark" if every_other else NO_TEXT
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    try:
+        for start in range(0, len(content) + 1, 2**20):
+            decoder.decode(content[start : start + 2**20], final=start + 2**20 > len(content))
+    except UnicodeDecodeError:
+        try:
+            content.decode("cp1252")
+        except UnicodeDecodeError:
+            return NO_TEXT
+        return "Windows-1252"
+    return "UTF-8"
+
+
+def read_text(name: str, path: str | Path, most: int = LARGEST) -> str:
+    """The text of a file in UTF-8, without the mark that editors on Windows put before it; ``ValueError`` names ``name``, the
+    file and another encoding."""
+    content = read(name, path, most)
+    said = encoding_of(content)
+    if said != "UTF-8":
+        raise ValueError(f"{name} = {named(path)} is in {said}; allowed: text in UTF-8")
+    return content.decode("utf-8-sig")
+
+
 def read_toml(name: str, path: str | Path) -> dict[str, Any]:
     """The tables of a TOML file; ``ValueError`` names ``name`` and the file."""
-    content = read(name, path)
-    tables: dict[str, Any] = _parsed(f"{name} = {named(path)} is no TOML", lambda: tomllib.loads(content.decode()), "TOML")
+    text = read_text(name, path)
+    tables: dict[str, Any] = _parsed(f"{name} = {named(path)} is no TOML", lambda: tomllib.loads(text), "TOML")
     return tables
 
 

@@ -11,10 +11,10 @@ from mcap.records import Channel, Chunk, Message
 from mcap.stream_reader import StreamReader
 
 
-def json_messages(content: bytes, most: int, longest: int) -> Iterator[tuple[str, int, dict[str, Any]]]:
-    """Topic, time in ns and content of all messages, in the file's order.
+def json_messages(content: bytes, most: int, longest: int) -> Iterator[tuple[str, int, Any]]:
+    """Topic, time in ns and content of all messages, in the file's order; the content is None where it is not JSON.
 
-    ``ValueError`` where they take more than ``most`` bytes unpacked, one of them more than ``longest``, or one is no JSON.
+    ``ValueError`` where they take more than ``most`` bytes unpacked, one in JSON more than ``longest``, or is damaged.
     """
     channels: dict[int, Channel] = {}
     for record in _records(content, most):
@@ -23,7 +23,8 @@ def json_messages(content: bytes, most: int, longest: int) -> Iterator[tuple[str
         elif isinstance(record, Message):
             channel = channels[record.channel_id]
             if channel.message_encoding != "json":
-                raise ValueError(f"channel {channel.topic} has messages in {channel.message_encoding}; allowed: json")
+                yield channel.topic, record.log_time, None
+                continue
             if len(record.data) > longest:
                 raise ValueError(f"a message of {channel.topic} has {len(record.data)} bytes; allowed: up to {longest}")
             yield channel.topic, record.log_time, json.loads(record.data)

@@ -1,0 +1,100 @@
+"""Headings of columns: a name in any case, which may be one of several for the same thing, and a unit beside it."""
+
+import re
+from collections.abc import Iterable
+
+from birthsim_env.tables.units import unit_of
+
+_CHAMBERS = ("P1", "N1", "P2", "N2")
+_OPENINGS = ("openings", "opening", "valve", "valves", "valve_opening", "valve_openings")
+_PRESSURES = ("pressures", "pressure", "p", "chamber_pressure")
+
+CONCEPTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "time": ("s", ("t", "times", "log_time", "timestamp", "elapsed", "elapsed_time", "x_value")),
+    **{f"position_{a}": ("m", (a, f"pos_{a}", f"{a}_position", f"{a}_pos")) for a in "xy"},
+    **{f"force_{a}": ("N", (f"F{a}", f"{a}_force", f"hand_force_{a}", f"user_force_{a}")) for a in "xy"},
+    "stiffness": ("N/m", ()),
+    **{
+        f"{words[0]}_{chamber}": (unit, tuple(name for word in words for name in (f"{word}_{chamber}", f"{chamber}_{word}")))
+        for words, unit in ((_OPENINGS, "1"), (_PRESSURES, "Pa"))
+        for chamber in _CHAMBERS
+    },
+}
+"""What a column can be -> its SI unit, and other names that say the same."""
+
+
+def key(name: str) -> str:
+    """Letters and digits of a name in one case: ``force_x``, ``Force X``, ``forceX`` and ``force.x`` are the same."""
+    return "".join(letter for letter in name.casefold() if letter.isalnum()) or name.strip()
+
+
+_CONCEPT = {key(name): concept for concept, (_, names) in CONCEPTS.items() for name in (concept, *names)}
+
+
+def concept(name: str) -> str:
+    """What a column of this name is: one of ``CONCEPTS``, else its ``key``."""
+    return _CONCEPT.get(key(name), key(name))
+
+
+def is_known(name: str) -> bool:
+    """Whether a name is one of ``CONCEPTS`` or another name of one."""
+    return key(name) in _CONCEPT
+
+
+def known_names() -> Iterable[str]:
+    """All names that ``is_known`` takes, without their other cases."""
+    return (name for concept, (_, names) in CONCEPTS.items() for name in (concept, *names))
+
+
+def name_and_unit(heading: str) -> tuple[str, str]:
+    """A heading as a name and the unit that it states, or "": ``Fx (N)``, ``Fx [N]``, ``Fx / N``, ``Fx_N``, ``Fx, N``.
+
+    A unit without brackets counts where it suits a known name, ``Fx_m`` is in no metres. Of a name that is not known, letters
+    at its end count where they can hardly mean anything else, as in ``Fz_kN``; they stay in the name.
+    """
+    text = " ".join(heading.strip().strip("\"'").split())
+    if is_known(text):
+        return text, ""
+    bracketed = re.fullmatch(r"(.*?)[\s_]*(?:\((.*)\)|\[(.*)\]|\{(.*)\})", text)
+    if bracketed is not None and bracketed[1]:
+        return bracketed[1], next(unit for unit in bracketed.groups()[1:] if unit is not None).strip()
+    apart = re.fullmatch(r"(.+?)\s*[/,_. ]\s*([^/,_. ]+(?:/m+)?)", text)
+    unit = None if apart is None else unit_of(apart[2])
+    if apart is None or unit is None:
+        return text, ""
+    if is_known(apart[1]) and CONCEPTS[concept(apart[1])][0] == unit[0]:
+        return apart[1], apart[2]
+    return text, apart[2] if len(apart[2]) > 1 and not is_known(apart[1]) else ""
+
+
+def is_units(cells: list[str]) -> bool:
+    """Whether a line of cells is a row of units: most of its words are known ones, and none is a name."""
+    words = [word for cell in cells if (word := _bare(cell))]
+    known = [unit_of(word) is not None for word in words]
+    named = [is_known(word) and not known[k] for k, word in enumerate(words)]
+    return sum(known) > len(words) / 2 and not any(named)
+
+
+def _bare(cell: str) -> str:
+    """What a cell of a row of units says, without brackets; nothing where it says that this is a row of units."""
+    cell = cell.strip()
+    cell = cell[1:-1].strip() if len(cell) > 1 and cell[0] + cell[-1] in ("()", "[]", "{}") else cell
+    return "" if key(cell) in ("unit", "units") else cell
+
+
+def units_of(cells: list[str]) -> list[str]:
+    """The units of a row of units, without their brackets."""
+    return [_bare(cell) for cell in cells]
+
+
+def is_like_force(name: str, unit: str) -> bool:
+    """Whether a column looks like a force, by its name or unit."""
+    found = unit_of(unit)
+    if found is not None and found[0] == "N":
+        return True
+    words = re.split(r"[^a-zA-Z0-9]+|(?<=[a-z])(?=[A-Z])", name)
+    return bool(
+        re.search(r"force|frc|kraft|wrench|loadcell|newton", key(name))
+        or re.fullmatch(r"(?i)f([ _.]?(hand|user|ext|meas|load)|[ _.]?[xyzabt12]([ _.].*)?)?", name)
+        or any(re.fullmatch(r"(?i)f[txyz]", word) for word in words)
+    )

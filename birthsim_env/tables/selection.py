@@ -1,0 +1,139 @@
+"""Which columns of a table are used for what: by name, by another name of the same, or as a user maps them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.values import in_line, near, shown
+from birthsim_env.tables.headings import CONCEPTS, concept, key
+from birthsim_env.tables.table import Table
+from birthsim_env.tables.units import unit_of, units_for
+
+BOOKKEEPING = ("topic", "log_time")
+"""Columns that BirthSIM's own logs have beside what was logged."""
+
+NOTHING = "none"
+"""What a user maps to say that there is no such column."""
+
+
+def mapping_of(argument: str, text: str, names: Sequence[str]) -> dict[str, str]:
+    """Name -> column, of a user's words: ``name=column,...``, or all columns in the order of ``names``.
+
+    ``ValueError`` names ``argument``, which may end in words of its own, as ``file.csv:`` does.
+    """
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    allowed = f"allowed: NAME=COLUMN,..., or a COLUMN for each of {', '.join(names)}"
+    pairs = [part.partition("=") for part in parts]
+    if parts and all(equals for _, equals, _ in pairs):
+        found = {name.strip(): column.strip() for name, _, column in pairs}
+        for name, column in found.items():
+            if name not in names or not column:
+                said = f"{shown(name)}{near(name, names)}" if column else f"{name}= without a column"
+                raise ValueError(f"{argument}{in_line(text)}: {said}; {allowed}")
+    elif parts and not any(equals for _, equals, _ in pairs) and len(parts) == len(names):
+        found = dict(zip(names, parts, strict=True))
+    else:
+        raise ValueError(f"{argument}{in_line(text)}; {allowed}")
+    columns = [column for column in found.values() if column != NOTHING]
+    if len(set(columns)) < len(columns) or len(found) < len(parts):
+        raise ValueError(f"{argument}{in_line(text)} names one of them twice; {allowed}")
+    return found
+
+
+class Selection:
+    """Columns of a ``table`` that are used, in SI, by the names of ``fields`` (name -> SI unit).
+
+    ``mapping`` says which column is meant, where a user says it; a field of ``NOTHING`` is not looked for. ``others`` says
+    in errors how a user can name columns.
+    """
+
+    def __init__(self, table: Table, fields: Mapping[str, str], mapping: Mapping[str, str], others: str) -> None:
+        self.table, self._fields, self._others = table, fields, others
+        self.used = {name: self._mapped(name, column) for name, column in mapping.items() if column != NOTHING}
+        for name in fields:
+            if name not in mapping:
+                found = self._named(name)
+                if found is not None:
+                    self.used[name] = found
+
+    def _mapped(self, name: str, column: str) -> str:
+        known = self.table.columns
+        folded = key(column)
+        same = [
+            *(one for one in known if column in (one, self.table.headings.get(one, one).strip())),
+            *(one for one in known if key(one) == folded or key(self.table.headings.get(one, one)) == folded),
+        ]
+        if not same:
+            said = f"has no column {shown(column)} for {name}{near(column, known)}"
+            raise ValueError(f"{self.table.source} {said}; there are: {self._listed(known)}")
+        return same[0]
+
+    def _named(self, name: str) -> str | None:
+        """The column of a field: its very name, its name in another case, or the one that has another name of the same."""
+        free = [one for one in self.table.columns if one not in self.used.values()]
+        for same in (
+            [one for one in free if one == name],
+            [one for one in free if key(one) == key(name)],
+            [one for one in free if concept(one) == concept(name)],
+        ):
+            if len(same) > 1 and set(same) & set(BOOKKEEPING):
+                same = [one for one in same if one not in BOOKKEEPING]
+            if len(same) > 1:
+                words = f"{in_line(' and '.join(same))}, which may each be {name}"
+                raise ValueError(f"{self.table.source} has {words}; allowed: one of them, {self._others}")
+            if same:
+                return same[0]
+        return None
+
+    @property
+    def unused(self) -> list[str]:
+        """Columns that no field uses, without BirthSIM's own bookkeeping."""
+        return [one for one in self.table.columns if one not in self.used.values() and one not in BOOKKEEPING]
+
+    def check(self, needed: Iterable[str]) -> None:
+        """``ValueError`` that lists what of ``needed`` is not there, and what may be meant."""
+        missing = [name for name in needed if name not in self.used]
+        if missing:
+            asked = next((words for name in missing if (words := self._like(name))), "")
+            there = self._listed(self.table.columns)
+            raise ValueError(
+                f"{self.table.source} lacks {in_line(', '.join(missing))}{asked}; there are: {there}; allowed: {self._others}"
+            )
+
+    def _listed(self, names: Iterable[str]) -> str:
+        return in_line(", ".join(names)) or "none"
+
+    def _like(self, name: str) -> str:
+        known = CONCEPTS.get(concept(name), ("", ()))[1]
+        words = (near(word, self.unused) for word in (name, *known) if len(word) > 2)
+        return next((f" ({name}: {found[2:]}" for found in words if found), "")
+
+    def values(self, name: str) -> Array:
+        """The numbers of a field (T,) in SI; ``ValueError`` where the column has another unit, or cannot be used."""
+        column, unit = self.used[name], self._fields[name]
+        values = self.table.column(column)
+        said = self.table.units.get(column, "")
+        if not said:
+            return values
+        found = unit_of(said)
+        if found is None or found[0] != unit:
+            raise ValueError(f"{self.table.source} has {name!r} in {in_line(said)}; allowed: {units_for(unit)}")
+        return values if found[1] == 1 else np.asarray(values * found[1])
+
+    def note(self, known: Iterable[str] = ()) -> str:
+        """What there is to say of columns that are not used, without the ``known`` others; nothing where there are none."""
+        others = {concept(name) for name in known}
+        unused = [one for one in self.unused if concept(one) not in others]
+        if not unused:
+            return ""
+        asked = next((words for name in self._fields if name not in self.used and (words := self._like(name))), "")
+        return f"{self.table.source}: columns that are not used: {in_line(', '.join(unused))}{asked}"
+
+
+def clock_note(selection: Selection) -> str:
+    """What there is to say of times that are dates or times of a day; nothing of others."""
+    time = selection.used.get("time", "")
+    if time not in selection.table.clocks:
+        return ""
+    return f"{selection.table.source}: column {time!r} has dates or times of a day; time is counted from the first one"
