@@ -86,7 +86,7 @@ def _steps(rows: int, rng: np.random.Generator) -> Array:
 
 def read_plan(path: Path, rig: Parameters) -> Plan:
     """The plan that ``Plan.write`` wrote; ``ValueError`` names what is wrong with the file, also for this rig."""
-    where, found = f"plan = {str(path)!r}", columns("plan", (path, ""), NAMES, tuple(NAMES)).T
+    where, found = f"plan = {str(path)!r}", columns("plan", (Path(path), ""), NAMES, tuple(NAMES)).T
     times, target, added = found[0], found[1:3], found[3:]
     if len(times) < 8:
         raise ValueError(f"{where} has {len(times)} rows; allowed: at least 8")

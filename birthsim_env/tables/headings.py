@@ -53,18 +53,19 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     at its end count where they can hardly mean anything else, as in ``Fz_kN``; they stay in the name.
     """
     text = " ".join(heading.strip().strip("\"'").split())
-    if is_known(text):
-        return text, ""
-    bracketed = re.fullmatch(r"(.*?)[\s_]*(?:\((.*)\)|\[(.*)\]|\{(.*)\})", text)
+    bracketed = re.fullmatch(r"(.*?)[\s_]*(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})", text)
     if bracketed is not None and bracketed[1]:
-        return bracketed[1], next(unit for unit in bracketed.groups()[1:] if unit is not None).strip()
-    apart = re.fullmatch(r"(.+?)\s*[/,_. ]\s*([^/,_. ]+(?:/m+)?)", text)
-    unit = None if apart is None else unit_of(apart[2])
+        said = next(unit for unit in bracketed.groups()[1:] if unit is not None).strip()
+        # pressures[P1] is the name of a chamber's pressure; openings_P1 [%] has a unit.
+        return (text, "") if key(said).isalnum() and unit_of(said) is None and is_known(text) else (bracketed[1], said)
+    apart = re.fullmatch(r"(.+?)\s*(?:[/,_. ]\s*([^/,_. %]+(?:/m+)?)|(%))", text)
+    word = "" if apart is None else apart[2] or apart[3]
+    unit = unit_of(word)
     if apart is None or unit is None:
         return text, ""
     if is_known(apart[1]) and CONCEPTS[concept(apart[1])][0] == unit[0]:
-        return apart[1], apart[2]
-    return text, apart[2] if len(apart[2]) > 1 and not is_known(apart[1]) else ""
+        return apart[1], word
+    return text, word if len(word) > 1 and not is_known(apart[1]) else ""
 
 
 def is_units(cells: list[str]) -> bool:

@@ -66,7 +66,7 @@ class Selection:
         ]
         if not same:
             said = f"has no column {shown(column)} for {name}{near(column, known)}"
-            raise ValueError(f"{self.table.source} {said}; there are: {self._listed(known)}")
+            raise ValueError(f"{self.table.source} {said}; allowed: {self._listed(known)}")
         return same[0]
 
     def _named(self, name: str) -> str | None:

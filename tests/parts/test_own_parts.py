@@ -1,4 +1,4 @@
-"""A user's own reference and hand: functions, files and classes; what a hand is asked, and when; columns of CSV files."""
+"""A user's own reference and hand: functions, files and classes; what a hand is asked, and when."""
 
 import math
 
@@ -9,8 +9,7 @@ import pytest
 from baselines.commands.worlds import with_options
 from baselines.registry import known_options, split_options
 from birthsim_env import Circle, UserForce
-from birthsim_env.parts.own_parts import COURSE, FORCE, Through, trajectory_of
-from birthsim_env.tables.columns import columns, table_file
+from birthsim_env.parts.own_parts import Through, trajectory_of
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -105,32 +104,6 @@ def test_a_name_carries_options_and_set_gives_them_to_those_that_have_them():
     ]
     assert split_options("pid[bandwidth=60,valves=one,on=true]") == ("pid", {"bandwidth": 60.0, "valves": "one", "on": True})
     assert split_options("pid") == ("pid", {})
-
-
-PUSH = {
-    "in order": ("time,Fx,Fy\n0,1,-2\n1,3,-4\n", ""),
-    "no heading": ("0,1,-2\n1,3,-4\n", ""),
-    "turned": ("time,Fy,Fx\n0,-2,1\n1,-4,3\n", ""),
-    "with units and more": ("marker,Fy [N],TIME (s),fx(N)\n7,-2,0,1\n8,-4,1,3\n", ""),
-    "as NumPy writes it": ("# Fx, time, Fy\n1,0,-2\n3,1,-4\n", ""),
-    "a remark before": ("# my hand\n\ntime,Fx,Fy\n0,1,-2\n# break\n1,3,-4\n", ""),
-    "other names": ("t,a,b,c\n0,9,-2,1\n1,9,-4,3\n", ":t,c,b"),
-}
-
-
-@pytest.mark.parametrize(("text", "names"), PUSH.values(), ids=PUSH)
-def test_a_heading_names_the_columns_in_any_order(text, names, tmp_path):
-    (tmp_path / "push.csv").write_text(text, encoding="utf-8")
-    found = columns("user_force", table_file(f"{tmp_path}/push.csv{names}"), FORCE, tuple(FORCE))
-    np.testing.assert_array_equal(found, [[0.0, 1.0, -2.0], [1.0, 3.0, -4.0]])
-
-
-def test_a_stiffness_needs_no_course_beside_it_once_it_is_named(tmp_path):
-    (tmp_path / "own.csv").write_text("stiffness,time\n1000,0\n2000,1\n", encoding="utf-8")
-    file = table_file(tmp_path / "own.csv")
-    np.testing.assert_array_equal(columns("stiffness", file, COURSE, ("time", "stiffness")), [[0, 1000], [1, 2000]])
-    assert table_file("own.py:Name") is None
-    assert table_file(3.0) is None
 
 
 def test_a_hand_of_a_file_pushes_as_it_says_between_its_rows_too(tmp_path):
