@@ -126,7 +126,7 @@ def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
 
 def _out(settings: Settings, suffixes: tuple[str, ...]) -> Path:
     out = settings.out
-    if out is None or out.suffix not in suffixes or not out.resolve().parent.is_dir():
+    if out is None or out.suffix.lower() not in suffixes or not out.resolve().parent.is_dir():
         given = "is missing" if out is None else repr(str(out))
         raise ValueError(f"--out {given}; allowed: a file that ends in {', '.join(suffixes)}, in a folder that exists")
     return out

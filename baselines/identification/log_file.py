@@ -133,10 +133,11 @@ def _towards_the_middle(position: Array, rig: Parameters) -> Array:
 def write_trial(trial: Trial, path: Path, rig: Parameters) -> None:
     """Write a trial of a simulated ``rig`` to a file .csv, .parquet or .mcap."""
     rows = np.vstack([trial.times, trial.openings, trial.pressures, trial.positions, trial.forces])
-    if path.suffix == ".csv":
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
         lines = [",".join(COLUMNS), *(",".join(f"{value:.10g}" for value in row) for row in rows.T)]
         write_text(path, "\n".join(lines) + "\n")
-    elif path.suffix in WRITERS:
+    elif suffix in WRITERS:
         values = dict(zip(COLUMNS, map(np.ascontiguousarray, rows), strict=True))
         write_log(Log(dict(COLUMNS), [Series("/rig", trial.times, values)], [], {"rig": rig.to_dict()}), path)
     else:

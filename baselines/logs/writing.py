@@ -27,7 +27,7 @@ _TYPES = {"f": "number", "i": "integer", "b": "boolean"}
 def write_log(log: Log, path: Path) -> None:
     """Write a log to a file ``.parquet`` or ``.mcap``; needs the extra ``log``."""
     with whole_file(path) as file:
-        WRITERS[path.suffix](log, file)
+        WRITERS[path.suffix.lower()](log, file)
 
 
 def _about(log: Log) -> dict[str, str]:

@@ -24,7 +24,7 @@ from birthsim_env.tables.columns import columns, table_file
 
 COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
 FORCE = {"time": "s", "Fx": "N", "Fy": "N"}
-"""Columns of a user's CSV files, with their units."""
+"""Columns of a user's tables, with their units."""
 
 GRID = 0.01
 """s between the instants at which a function of time is taken; a spline of degree 5 runs through them."""

@@ -20,7 +20,7 @@ from birthsim_env.tables.table import Reading, Table
 LARGEST = 64 * 2**20
 """Bytes of a file; an hour at 1 kHz takes them."""
 
-_FILE = re.compile(rf"(.+(?:{'|'.join(map(re.escape, READERS))}))(?::(.*))?", re.IGNORECASE | re.DOTALL)
+_FILE = re.compile(rf"(.+?(?:{'|'.join(map(re.escape, READERS))}))(?::(.*))?", re.IGNORECASE | re.DOTALL)
 
 
 def table_file(value: Any) -> tuple[Path, str] | None:

@@ -6,5 +6,6 @@ from studies.fuzz.files import FILES
 from studies.fuzz.harness import Kind
 from studies.fuzz.own_parts import OWN_PARTS
 from studies.fuzz.sealed import SEALED
+from studies.fuzz.tables import TABLES
 
-KINDS: dict[str, Kind] = {**FILES, **OWN_PARTS, **SEALED, **CALLS, **COMMANDS}
+KINDS: dict[str, Kind] = {**FILES, **OWN_PARTS, **TABLES, **SEALED, **CALLS, **COMMANDS}

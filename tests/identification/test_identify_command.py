@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from baselines.commands import identify
 from baselines.identification.identified import REMEMBER
 from baselines.identification.identified import identify as identify_trial
+from baselines.identification.trial import Trial
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from tests.console import call
 from tests.figures import caught
@@ -27,6 +29,36 @@ def test_experiment_and_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cap
     assert (status, printed) == (0, f"written to {log}: 4000 rows, 3.999 s\n")
     assert log.read_text().startswith("time,openings_P1,openings_N1,")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "plan.csv", "true.toml"]
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_log_that_is_read_by_options_and_what_is_said_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from baselines.identification.log_file import write_trial
+
+    def read(found: Trial, *_: object, **__: object) -> None:
+        trials.append(found)
+        raise ValueError("read")
+
+    trials: list[Trial] = []
+    short, log = part(trial(), 0, 2100), tmp_path / "log.CSV"
+    write_trial(short, log, TRUE)
+    head, _, numbers = log.read_text().partition("\n")
+    head = head.replace("force_x", "Fz").replace("force_y", "Fq").replace(",", ";")
+    log.write_text("Laboratory\n" + head + "\n" + numbers.replace(",", ";").replace(".", ","), encoding="utf-16")
+    monkeypatch.setattr(identify, "identify", read)
+    line = [log, "--parameters", tmp_path / "true.toml", "--out", tmp_path / "rig.toml", "--decimal-comma", "--skip", 1]
+    TRUE.to_toml(tmp_path / "true.toml")
+    status, _, complained = call("identify", monkeypatch, capsys, *line)
+    assert status == 2
+    assert "Fz may be a force; allowed: --columns force_x=" in complained
+    status, _, complained = call("identify", monkeypatch, capsys, *line, "--columns", "force_x=Fz,force_y=none")
+    first, *_, last = complained.splitlines()
+    assert first == f"birthsim identify: warning: log = '{log}': columns that are not used: Fq"
+    assert (status, last) == (2, "birthsim identify: error: read")
+    for name in ("times", "openings", "pressures", "positions"):
+        np.testing.assert_allclose(getattr(trials[0], name), getattr(short, name), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -53,6 +53,11 @@ def test_what_is_drawn_is_said():
     assert described(Parameters(), {"mechanics.mass": (2, 3)}) == "rigs drawn: mass 2 to 3 kg"
 
 
+def test_an_editor_on_windows_may_put_a_mark_before_a_rig(tmp_path):
+    (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 4.5\n", encoding="utf-8-sig")
+    assert Parameters.from_toml(tmp_path / "rig.toml").mechanics.mass == 4.5
+
+
 def test_the_dead_volume_follows_the_bore(tmp_path):
     rig = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}})
     assert rig.chambers.dead_volume == pytest.approx(4 * Parameters().chambers.dead_volume)

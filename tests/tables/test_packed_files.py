@@ -180,13 +180,20 @@ MATLAB: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "a structure": ({"log": {"t": TIMES, "Fx": VALUES}}, {"do_compression": True}),
     "structures": ({"log": {"t": TIMES, "force": {"x": VALUES, "y": VALUES}}}, {}),
     "Simulink": ({"out": {"time": TIMES, "signals": np.array([(VALUES, "force_x")], dtype=LABELLED)}}, {}),
-    "dSPACE": ({"run": {"X": np.array([(1e3 * TIMES, "time", "ms")], dtype=NAMED),
-                        "Y": np.array([(VALUES, "Fx", "N"), (VALUES, "other", "V")], dtype=NAMED)}}, {}),
+    "dSPACE": (
+        {
+            "run": {
+                "X": np.array([(1e3 * TIMES, "time", "ms")], dtype=NAMED),
+                "Y": np.array([(VALUES, "Fx", "N"), (VALUES, "other", "V")], dtype=NAMED),
+            }
+        },
+        {},
+    ),
     "a matrix with names": ({"data": MATRIX, "names": np.array(["time", "Fx"], dtype=object)}, {}),
     "a matrix on its side": ({"data": MATRIX.T, "names": np.array(["time", "Fx"], dtype=object)}, {}),
     "texts": ({"time": TIMES, "force_x": np.array([str(value) for value in VALUES], dtype=object)}, {}),
     "no imaginary part": ({"time": TIMES, "force_x": VALUES + 0j}, {}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", MATLAB)

@@ -2,6 +2,7 @@
 
 import codecs
 import json
+import os
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +24,11 @@ def read(name: str, path: str | Path, most: int = LARGEST) -> bytes:
     """The content of a file of at most ``most`` bytes; ``ValueError`` begins with ``name``, the argument that says the path."""
     try:
         with open(path, "rb") as file:
-            content = file.read(most + 1)
+            # As much as is asked for is set aside at first. What says no size, such as a pipe, may send more.
+            size = min(os.fstat(file.fileno()).st_size, most)
+            content = file.read(size + 1)
+            if len(content) > size:
+                content += file.read(most + 1 - len(content))
     except OSError as error:
         raise ValueError(f"{name} = {named(path)} cannot be read: {error.strerror or error}; allowed: a file") from error
     except ValueError as error:  # a zero byte
