@@ -33,7 +33,7 @@ _WHY = (
         "it looks like a date or a time of day",
         "s, or 2024-05-01T10:00:00.001",
     ),
-    (r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d_/]+(?:/\w+)?", "it has a unit", "the unit in the heading"),
+    (r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?:%|[^\W\d_/]+(?:/\w+)?)", "it has a unit", "the unit in the heading"),
     (r".*\d[ij]\)?|\(.*[ij]\)", "it is complex", "a real number"),
 )
 """What a cell that is no number looks like; the cause in words, and what is allowed instead."""
@@ -42,7 +42,7 @@ _WHY = (
 def number(text: str, decimal_comma: bool = False) -> float | None:
     """The number that a cell says, NaN where it says that there is none; None for a cell that is no number."""
     text = text.strip()
-    if text.casefold() in MISSING:
+    if is_missing(text):
         return math.nan
     if "_" in text or (decimal_comma and "." in text):  # a point would separate thousands
         return None
@@ -73,9 +73,14 @@ def instant(text: str) -> tuple[str, int] | None:
     return "time", seconds * 10**9 + int((clock[4] or "0").ljust(9, "0"))
 
 
+def is_missing(text: str) -> bool:
+    """Whether a cell says that there is no value."""
+    return text.strip().casefold() in MISSING
+
+
 def is_number(text: str, decimal_comma: bool = False) -> bool:
-    """Whether a cell says a number or an instant, or nan in words."""
-    return bool(text.strip(" -")) and (number(text, decimal_comma) is not None or instant(text) is not None)
+    """Whether a cell says a number or an instant."""
+    return not is_missing(text) and (number(text, decimal_comma) is not None or instant(text) is not None)
 
 
 def why(text: str, how: Reading) -> str:
@@ -109,7 +114,7 @@ class Cells:
         value = None if self._kind else number(text, self._how.decimal_comma)
         if value is not None:
             return value
-        if text.strip().casefold() in MISSING:
+        if is_missing(text):
             return math.nan
         found = instant(text)
         if found is not None and row == 0:

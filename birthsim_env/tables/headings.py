@@ -70,7 +70,7 @@ def name_and_unit(heading: str) -> tuple[str, str]:
 
 def is_units(cells: list[str]) -> bool:
     """Whether a line of cells is a row of units: most of its words are known ones, and none is a name."""
-    words = [word for cell in cells if (word := _bare(cell))]
+    words = [word for cell in cells if (word := _bare(cell)) not in ("", "-")]
     known = [unit_of(word) is not None for word in words]
     named = [is_known(word) and not known[k] for k, word in enumerate(words)]
     return sum(known) > len(words) / 2 and not any(named)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby, islice, zip_longest
 from typing import NamedTuple
 
-from birthsim_env.tables.cells import is_number
+from birthsim_env.tables.cells import is_missing, is_number
 from birthsim_env.tables.headings import is_units, key, name_and_unit, units_of
 from birthsim_env.tables.table import Reading
 
@@ -25,7 +25,7 @@ _COMMENT = re.compile(r"\s*[#%]+\s?")
 @dataclass(frozen=True)
 class Layout:
     """``begin`` lines stand before the first row. Line ``heading`` has the ``names``; without a heading there are none, and
-    ``heading`` is 0. ``before`` counts lines before the heading that are no remarks."""
+    ``heading`` is 0. ``before`` counts lines before the rows that are neither of these nor remarks."""
 
     separator: str
     names: list[str]
@@ -68,8 +68,9 @@ def split(line: str, separator: str) -> list[str]:
 def layout_of(lines: Iterable[str], how: Reading) -> Layout:
     """The layout of a text; its first lines are enough.
 
-    The heading is the last line before the numbers that has as many cells as they, and no number. A row of units may follow.
-    Where no line is like this, the first one is the heading, unless it has a number.
+    The heading is the last line before the numbers that has as many cells as they, no number, and a known name if one has.
+    Where no line is like this, it is the first one with two known names, or the first one if it has no number. A row of units
+    may follow.
     """
     sample: list[str] = []
     size = 0
@@ -88,61 +89,78 @@ def layout_of(lines: Iterable[str], how: Reading) -> Layout:
         cells = split(_COMMENT.sub("", line, count=1) if remark else line, separator)
         if any(cells):
             rows.append(_Line(number, remark, cells))
-    plain = [row for row in rows if not row.is_remark]
-    heading, units = _heading(rows, how)
-    if heading is None and plain and not any(is_number(cell, how.decimal_comma) for cell in plain[0].cells):
-        heading = plain[0]
+    heading, units, begin = _heading(rows, how)
+    plain = [row for row in rows if not row.is_remark and row not in (heading, units)]
     if heading is None:
         return Layout(separator, [], [], 0, plain[0].number - 1 if plain else len(sample))
-    before = sum(row.number < heading.number for row in plain)
-    last = heading.number if units is None else units.number
-    return Layout(separator, heading.cells, [] if units is None else units_of(units.cells), heading.number, last, before)
+    before = sum(row.number <= begin for row in plain)
+    return Layout(separator, heading.cells, [] if units is None else units_of(units.cells), heading.number, begin, before)
+
+
+def _has_number(row: _Line, how: Reading) -> bool:
+    return any(is_number(cell, how.decimal_comma) for cell in row.cells)
 
 
 def _is_data(row: _Line, how: Reading) -> bool:
-    numbers = [is_number(cell, how.decimal_comma) for cell in row.cells]
-    rest = [cell for cell, is_one in zip(row.cells, numbers, strict=True) if not is_one]
-    return not row.is_remark and any(numbers) and not any(cell.strip("-") for cell in rest)
+    return _has_number(row, how) and all(is_missing(cell) or is_number(cell, how.decimal_comma) for cell in row.cells)
 
 
-def _heading(rows: list[_Line], how: Reading) -> tuple[_Line | None, _Line | None]:
-    """The heading before the first two rows of numbers, and the row of units between them, where there are such."""
-    data = [row for row in rows if not row.is_remark]
-    for row, following in zip_longest(data, data[1:]):
+def _known(row: _Line, how: Reading) -> int:
+    """How many cells are names that somebody asks for."""
+    return sum(how.asks_for(name_and_unit(cell)[0]) for cell in row.cells)
+
+
+def _heading(rows: list[_Line], how: Reading) -> tuple[_Line | None, _Line | None, int]:
+    """The heading and the row of units, where there are such, and the last line before the rows."""
+    plain = [row for row in rows if not row.is_remark]
+    for row, following in zip_longest(plain, plain[1:]):
         if _is_data(row, how) and (following is None or (_is_data(following, how) and row.widths & following.widths)):
-            return _above(row, [other for other in rows if other.number < row.number], how)
-    return None, None
+            above = _above(row, [other for other in rows if other.number < row.number], how)
+            units = next((line for line in above if is_units(line.cells)), None)
+            headings = [line for line in above if line is not units and (not line.is_remark or _known(line, how))]
+            if headings:
+                return next((line for line in headings if _known(line, how)), headings[0]), units, row.number - 1
+            break
+    worded = [row for row in rows if not _has_number(row, how)]
+    heading = next((row for row in worded if _known(row, how) > 1), None)
+    if heading is None and plain and plain[0] in worded:
+        heading = plain[0]
+    if heading is None:
+        return None, None, 0
+    following = next((row for row in plain if row.number > heading.number), None)
+    units = following if following is not None and is_units(following.cells) else None
+    return heading, units, (units or heading).number
 
 
-def _above(row: _Line, before: list[_Line], how: Reading) -> tuple[_Line | None, _Line | None]:
-    units = None
+def _above(row: _Line, before: list[_Line], how: Reading) -> list[_Line]:
+    """The lines before the first row that can be its heading or its units, the nearest first."""
+    above = []
     for line in reversed(before):
         cells = line.cells
         # LabVIEW has a column of comments, in a row that has none not even its separator.
-        fits = bool(line.widths & row.widths) or (key(cells[-1]) == "comment" and len(cells) - 1 in row.widths)
-        if not fits or any(is_number(cell, how.decimal_comma) for cell in cells):
-            if line.is_remark:
-                continue
+        commented = key(cells[-1]) == "comment" and len(cells) - 1 in row.widths
+        worded = not _has_number(line, how) and not all(is_missing(cell) for cell in cells)
+        if worded and line.widths & row.widths:
+            above.append(line)
+        elif worded and commented:
+            above.append(line._replace(cells=cells[:-1]))
+        elif not line.is_remark:
             break
-        if units is None and is_units(cells):
-            units = line
-        elif not line.is_remark or any(how.asks_for(name_and_unit(cell)[0]) for cell in cells):
-            cut = cells if line.widths & row.widths else cells[:-1]
-            return line._replace(cells=cut), units
-    return None, None
+    return above
 
 
 def _separator(sample: list[str], how: Reading) -> str:
-    """What splits the most lines in a row into equally many cells, at least two."""
-    best, longest = ",", 0
+    """What splits the most lines in a row into equally many cells, at least two; blanks and decimal commas come last."""
     lines = [line for line in sample if line.strip()]
-    for separator in SEPARATORS:
-        if separator == "," and how.decimal_comma:
-            continue
-        widths = (len(split(line, separator)) for line in lines)
-        run = max((sum(1 for _ in same) for width, same in groupby(widths) if width > 1), default=0)
-        if run > longest:
-            best, longest = separator, run
+    sure = [separator for separator in SEPARATORS if separator != "," or not how.decimal_comma]
+    runs = {separator: _run(lines, separator) for separator in sure}
+    if any(runs.values()):
+        return max(sure, key=lambda separator: runs[separator])
     blank = [line.split() for line in lines]
     spaced = any(len(cells) > 1 and all(is_number(cell, how.decimal_comma) for cell in cells) for cells in blank)
-    return SPACES if spaced and not longest else best
+    return SPACES if spaced else ","
+
+
+def _run(lines: list[str], separator: str) -> int:
+    widths = (len(trimmed(split(line, separator))) for line in lines)
+    return max((sum(1 for _ in same) for width, same in groupby(widths) if width > 1), default=0)

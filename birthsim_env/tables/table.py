@@ -104,7 +104,7 @@ def table_of(
     clocks = set[str]()
     for place, column in kept:
         name, unit = name_and_unit(column.heading)
-        name = name or f"column {place}"
+        name = "".join(letter if letter.isprintable() else "?" for letter in name) or f"column {place}"
         if name in values:
             faults[name] = "is there more than once; allowed: one column of each name"
             continue

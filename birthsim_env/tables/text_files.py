@@ -30,7 +30,9 @@ def read_text_file(source: str, content: bytes, how: Reading) -> Table:
         raise ValueError(f"{source} is no CSV ({problem(error)}); allowed: lines of numbers") from error
     notes = [note] if note else []
     if layout.before and how.skip is None:
-        notes.append(f"{source}: the heading is line {layout.heading}; {layout.before} lines before it are left out")
+        notes.append(
+            f"{source}: the heading is line {layout.heading}; other lines before the numbers are left out: {layout.before}"
+        )
     return rows.table(notes)
 
 

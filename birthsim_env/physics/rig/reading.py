@@ -39,12 +39,14 @@ def read(name: str, path: str | Path, most: int = LARGEST) -> bytes:
 
 
 def encoding_of(content: bytes) -> str:
-    """The encoding of a text by its byte-order mark and its bytes: ``UTF-8``, with or without a mark, ``UTF-16`` and ``UTF-32``
-    with one, ``UTF-16 without a byte-order mark``, ``Windows-1252`` for other text, ``NO_TEXT``."""
+    """How a text is encoded, by its byte-order mark and its bytes: ``UTF-8``, with or without a mark, ``UTF-16``, ``UTF-32``,
+    ``Windows-1252``, or words for what cannot be read, such as zeros at the end, which a loss of power leaves."""
     marks = {"UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE), "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)}
     for name, begins in marks.items():
         if content.startswith(begins):
             return name
+    if content.endswith(b"\0") and b"\0" not in content.rstrip(b"\0")[:LARGEST]:
+        return "text that ends in zero bytes"
     if b"\0" in content[:LARGEST]:
         halves = content[:2000:2], content[1:2000:2]
         every_other = any(half.count(0) > 0.9 * len(half) for half in halves) and not all(0 in half for half in halves)
