@@ -1,8 +1,6 @@
 """Tables in MATLAB files up to version 7: vectors, structures of them, signals with names, matrices with names beside them."""
 
 import io
-import struct
-import zlib
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -11,9 +9,8 @@ import numpy as np
 
 from birthsim_env.physics.rig.values import in_line, problem, shown
 from birthsim_env.tables.cells import Cells
+from birthsim_env.tables.mat_arrays import Foreign, variables_of
 from birthsim_env.tables.table import Raw, Reading, Table, table_of
-
-_HEADER, _TAG, _COMPRESSED = 128, 8, 15
 
 DEPTH = 5
 """Levels of structures in which vectors are looked for."""
@@ -23,36 +20,24 @@ NEWER = "is a MATLAB 7.3 file (HDF5), which is not read; allowed: one of save(..
 
 def read_mat(source: str, content: bytes, how: Reading) -> Table:
     """The table of a MATLAB file; a vector of another length than most is no column."""
-    from scipy.io import loadmat  # late: it would double the time of ``import birthsim_env``
-
-    if content.startswith((b"MATLAB 7.3", b"\x89HDF")):
+    if content.startswith(b"MATLAB 7.3") or b"\x89HDF" in content[:1024]:
         raise ValueError(f"{source} {NEWER}")
     try:
-        variables = loadmat(io.BytesIO(_unpacked(content, how.most)), squeeze_me=False, verify_compressed_data_integrity=False)
-        found = list(_columns({name: value for name, value in variables.items() if not name.startswith("__")}))
+        found = list(_columns(_variables(source, content, how)))
     except Exception as error:
-        # Damage trips SciPy, struct, zlib and NumPy in a dozen ways.
+        # Damage trips struct, zlib, NumPy and iterators in a dozen ways.
         raise ValueError(f"{source} cannot be read as MATLAB ({problem(error)}); allowed: one of save(..., '-v7')") from error
     return table_of(source, _equal(source, found))
 
 
-def _unpacked(content: bytes, most: int) -> bytes:
-    """The file without compression, which takes at most ``most`` bytes; what it says of its own sizes is not believed."""
-    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
-    if order is None:
-        return content  # of version 4, which has no compression
-    parts, place, size = [content[:_HEADER]], _HEADER, 0
-    while place + _TAG <= len(content):
-        kind, length = struct.unpack_from(f"{order}II", content, place)
-        part = content[place : place + _TAG + length]
-        if kind == _COMPRESSED:
-            part = zlib.decompressobj().decompress(part[_TAG:], most + 1 - size)
-        parts.append(part)
-        size += len(part)
-        if size > most:
-            raise ValueError(f"it holds more than {most} bytes")
-        place += _TAG + length
-    return b"".join(parts)
+def _variables(source: str, content: bytes, how: Reading) -> dict[str, Any]:
+    if content[126:128] in (b"IM", b"MI"):
+        return variables_of(content, how.most, lambda numbers: how.check_size(source, numbers))
+    if 0 not in content[:4]:
+        raise ValueError("it is of no version of MATLAB")
+    from scipy.io import loadmat  # late: it would double the time of ``import birthsim_env``
+
+    return {name: value for name, value in loadmat(io.BytesIO(content)).items() if not name.startswith("__")}  # version 4
 
 
 def _columns(variables: dict[str, Any]) -> Iterator[Raw]:
@@ -113,7 +98,8 @@ def _words(value: Any) -> list[str]:
 def _vectors(name: str, value: Any, unit: str) -> Iterator[Raw]:
     """The column of a vector; nothing of a matrix."""
     if not isinstance(value, np.ndarray):
-        yield _unusable(name, f"is {shown(type(value).__name__)}; allowed: full arrays of numbers")
+        kind = value.kind if isinstance(value, Foreign) else shown(type(value).__name__)
+        yield _unusable(name, f"is {kind}; allowed: full arrays of numbers")
         return
     words = _words(value)
     if words and value.dtype == object and max(value.shape) == value.size:
