@@ -1,7 +1,6 @@
 """Headings of columns: a name in any case, which may be one of several for the same thing, and a unit beside it."""
 
 import re
-from collections.abc import Iterable
 
 from birthsim_env.tables.units import unit_of
 
@@ -39,11 +38,6 @@ def concept(name: str) -> str:
 def is_known(name: str) -> bool:
     """Whether a name is one of ``CONCEPTS`` or another name of one."""
     return key(name) in _CONCEPT
-
-
-def known_names() -> Iterable[str]:
-    """All names that ``is_known`` takes, without their other cases."""
-    return (name for concept, (_, names) in CONCEPTS.items() for name in (concept, *names))
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
