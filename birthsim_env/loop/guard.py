@@ -88,6 +88,13 @@ class Kept(Rows):
     ended = row("1", "1 where the control has ended")
 
 
+class Found(Rows):
+    """What a lane is found to lack."""
+
+    bad = rows(_COUNT, "1", "1 where a signal is not good")
+    any = row("1", "1 where one is, or was in the last period")
+
+
 @helper
 def _replace(signals: Array, bad: Array, kept: Kept, about: Limits, n: int) -> None:
     """Puts the last good signal in the place of what is ``bad``, and counts."""
@@ -115,9 +122,10 @@ def _replace(signals: Array, bad: Array, kept: Kept, about: Limits, n: int) -> N
 @kernel
 def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lane: int, n: int) -> int:
     """Replaces what is not good; returns how many lanes are asked for something that is not."""
-    signals, bad, wrong, refused = seen.rows[:_ROWS], scratch(_COUNT), scratch(1), 0
+    signals, found, refused = seen.rows[:_ROWS], Found(scratch(Found.size)), 0
+    bad = found.bad
     for i in range(n):
-        wrong[0, i] = kept.late[i]
+        found.any[i] = kept.late[i]
         # What stands in for a clock that fails.
         kept.good[_CLOCK, i] += about.period
     for signal in range(_COUNT):
@@ -128,12 +136,12 @@ def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lan
         for i in range(n):
             # A comparison with what is not a number is false.
             beyond = 0.0 if abs(signals[k, i]) <= most else 1.0
-            bad[signal, i], wrong[0, i] = max(bad[signal, i], beyond), max(wrong[0, i], beyond)
-    found = 0.0
+            bad[signal, i], found.any[i] = max(bad[signal, i], beyond), max(found.any[i], beyond)
+    some = 0.0
     for i in range(n):
-        found = max(found, wrong[0, i])
+        some = max(some, found.any[i])
         refused += 1 if bad[_ASKED, i] > 0.0 else 0
-    if found > 0.0:
+    if some > 0.0:
         _replace(signals, bad, kept, about, n)
     for k in range(_ROWS):
         for i in range(n):
