@@ -105,6 +105,7 @@ def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:
 def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
     out = _out(settings, (".toml",))
     trial = read_trial(log, owner, LogOptions(settings.columns or "", settings.skip, settings.decimal_comma))
+    print("".join(f"{note}\n" for note in trial.notes), end="", flush=True)
     folder = None if settings.report is None else make_folder(settings.report)
     with _bar(None, "fit", "evaluations") as tick:
         found = identify(trial, owner, settings.seed, tick=tick)
@@ -119,7 +120,7 @@ def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
             drawn = [*residuals_figure(found, place), *intervals_figure(found, place)]
             pictures = [path.name for path in drawn if path.suffix == ".png"]
             shown = [f"![{name}]({name})" for name in pictures]
-            text = [f"# {log.name}", "", *(f"- {line}" for line in found.words()), "", *shown]
+            text = [f"# {log.name}", "", *(f"- {line}" for line in (*found.notes, *found.words())), "", *shown]
             write_text(place / "report.md", "\n".join(text) + "\n")
         print(f"written to {folder}/: report.md, {', '.join(pictures)} (each picture as .svg too)")
 

@@ -47,7 +47,7 @@ def certainty_of(fit: Fit) -> Certainty:
     """What is known of a fit's coordinates."""
     covariance = fit.covariance
     noise = np.sqrt(np.diag(covariance))
-    windows = np.sqrt(np.diag(covariance @ score_products(fit) @ covariance))
+    windows = np.sqrt(np.diag(covariance @ _scores(fit) @ covariance))
     spread = fit.problem.spread
     deviation = np.maximum(noise, windows)
     # Singular values of the scaled Jacobian, from those of its inverse square.
@@ -56,10 +56,13 @@ def certainty_of(fit: Fit) -> Certainty:
     return Certainty(noise, windows, deviation, deviation < DETERMINED * spread, weakest)
 
 
-def score_products(fit: Fit) -> Array:
-    """The sum of s s' (Q, Q) over windows, s = J'r."""
-    residual = fit.problem.settled(fit.theta)[1]
-    scores = np.einsum("wrq,wr->wq", fit.problem.derivatives, residual)
+def _scores(fit: Fit) -> Array:
+    return score_products(fit.problem.settled(fit.theta)[1], fit.problem.derivatives)
+
+
+def score_products(residual: Array, derivatives: Array) -> Array:
+    """The sum of s s' (Q, Q) over windows, s = J'r, for residuals (W, R) with ``derivatives`` (W, R, Q)."""
+    scores = np.einsum("wrq,wr->wq", derivatives, residual)
     return np.asarray(scores.T @ scores)
 
 

@@ -6,15 +6,18 @@ alone. A first search takes short windows, and begins at the owner's rig and at 
 all of the trial.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
+from baselines.identification.budget import UnsettledError
 from baselines.identification.noise import guessed_noise, noise_from
 from baselines.identification.offsets import Offsets
 from baselines.identification.quantities import QUANTITIES, Quantity, coordinates, limits, rig_at
+from baselines.identification.robust import reweighted
 from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
 from baselines.identification.windows import FREE, Windows, cut
@@ -43,6 +46,12 @@ MOVED, MOST_ROUNDS = 0.05, 3
 STILL, MOST_STEPS = 0.1, 6
 """Where offsets move by less than so many standard deviations an evaluation ends; steps at most."""
 
+MOST_WEIGHTS = 3
+"""Times that a search is repeated with new weights (``robust``) at most."""
+
+NAMED = 3
+"""Windows that are named where a search fails."""
+
 Tick = Callable[[], object]
 
 
@@ -56,14 +65,21 @@ class Problem:
     def __init__(
         self, windows: Windows, noise: Noise, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick
     ) -> None:  # fmt: skip
-        self.windows, self.noise, self.quantities, self._owner, self._tick = windows, noise, quantities, owner, tick
+        self.noise, self.quantities, self._owner, self._tick = noise, quantities, owner, tick
         self.centre, self.limits = coordinates(owner, quantities), limits(owner, quantities)
         self.spread: Array = np.array([one.spread for one in quantities])
         self._start: Array = np.zeros((len(windows.starts), len(FREE)))
-        self.offsets = Offsets(windows, noise, owner.electronics)
-        self._at: tuple[bytes, Array, Array, Array] = (b"", self._start, self._start, self._start)
-        self.slopes: Slopes | None = None
+        self._at: tuple[bytes, Array, Array, Array]
+        self._slopes: Slopes | None
+        self._take(windows)
+        self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(FREE)
         self.derivatives: Array = np.empty(0)
+
+    @property
+    def slopes(self) -> Slopes:
+        """Those that the start states at the last coordinates were sought with."""
+        assert self._slopes is not None, "coordinates were settled"
+        return self._slopes
 
     def rig_at(self, theta: Array) -> Parameters:
         """The rig at coordinates (Q,)."""
@@ -75,25 +91,68 @@ class Problem:
         self._start = begun_anew(self.offsets.corrected(), self.noise, rig, self._start)
 
     def settled(self, theta: Array) -> tuple[Array, Array]:
-        """Start states (W, 14) and residuals (W, R + 14) at coordinates (Q,)."""
+        """Start states (W, 14) and residuals (W, R + 14) at coordinates (Q,); NaN where the rig predicts no numbers."""
         if self._at[0] != theta.tobytes():
             self._tick()
-            rig, free = self.rig_at(theta), self._start
-            if self.slopes is None:
-                self._linearize(rig)
-            least, sizes = np.inf, self.offsets.sizes
-            for _ in range(MOST_STEPS):
-                tried = settle(self.offsets.corrected(), self.noise, rig, free, self.slopes)
-                cost = float(np.sum(tried[1] ** 2) + np.sum(self.offsets.sizes**2))
-                if cost < least or not np.isfinite(least):
-                    least, sizes, (free, residual) = cost, self.offsets.sizes, tried
-                    if not self.offsets.step(residual) >= STILL:
-                        break
-                else:
-                    self.offsets.sizes = 0.5 * (self.offsets.sizes + sizes)
+            before = self.offsets.sizes
+            try:
+                free, residual, sizes = self._settled(self.rig_at(theta))
+            except np.linalg.LinAlgError:
+                free, residual, sizes = self._start, np.full((len(self._start), self._columns), np.nan), before
             self.offsets.sizes = sizes
             self._at = theta.tobytes(), free, residual, sizes
         return self._at[1:3]
+
+    def _settled(self, rig: Parameters) -> tuple[Array, Array, Array]:
+        """Start states, residuals and sizes of the offsets that fit a rig best."""
+        slopes, free, residual = self._slopes or self._linearize(rig), self._start, np.empty(0)
+        least, sizes = np.inf, self.offsets.sizes
+        for _ in range(MOST_STEPS):
+            tried = settle(self.offsets.corrected(), self.noise, rig, free, slopes)
+            cost = float(np.sum(tried[1] ** 2) + np.sum(self.offsets.sizes**2))
+            if cost < least or not np.isfinite(least):
+                least, sizes, (free, residual) = cost, self.offsets.sizes, tried
+                if not self.offsets.step(residual) >= STILL:
+                    break
+            else:
+                self.offsets.sizes = 0.5 * (self.offsets.sizes + sizes)
+        return free, residual, sizes
+
+    def reweigh(self, theta: Array) -> bool:
+        """Give measurements the weights that their residuals at coordinates (Q,) ask for; whether these are others."""
+        windows = reweighted(self.windows, self.settled(theta)[1])
+        if windows is None:
+            return False
+        self._start, sizes = self._at[1], self.offsets.sizes
+        self._take(windows)
+        self.offsets.sizes = sizes
+        return True
+
+    def _take(self, windows: Windows) -> None:
+        self.windows, self.offsets = windows, Offsets(windows, self.noise, self._owner.electronics)
+        self._at, self._slopes = (b"", self._start, self._start, self._start), None
+
+    @contextmanager
+    def explained(self) -> Iterator[None]:
+        """Where the numbers of a search break down, or its budget ends, a ``ValueError`` names where log and model disagree."""
+        try:
+            with np.errstate(all="ignore"):
+                yield
+        except (np.linalg.LinAlgError, UnsettledError) as error:
+            raise ValueError(self.disagreement()) from error
+
+    def disagreement(self) -> str:
+        """Where log and model disagree, in words, and what may be the cause."""
+        costs = np.sum(self._at[2] ** 2, axis=1)
+        worst = np.argsort(np.where(np.isfinite(costs), costs, np.inf))[::-1][:NAMED]
+        times, trial = self.windows.trial.times, self.windows.trial
+        length = trial.period * self.windows.length
+        stretches = [f"{times[first]:.4g} to {times[first] + length:.4g} s" for first in np.sort(self.windows.starts[worst])]
+        return (
+            "the log and the model of the rig disagree so much that no parameters are found, most of all in "
+            f"{', '.join(stretches)}; allowed: columns in their places and units, sensors that hold, a rig (--parameters) near "
+            "the laboratory's"
+        )
 
     def residuals(self, theta: Array) -> Array:
         """All residuals, (W (R + 14) + E + Q,)."""
@@ -112,14 +171,17 @@ class Problem:
         return np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
 
     def _linearize(self, rig: Parameters) -> Slopes:
-        self.slopes = slopes_at(self.windows, self.noise, rig, self._start)
-        self.offsets.linearize(self.slopes)
-        return self.slopes
+        self._slopes = slopes_at(self.windows, self.noise, rig, self._start)
+        self.offsets.linearize(self._slopes)
+        return self._slopes
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Coordinates (Q,) that fit best, in a rig, with the problem that they solve and its last Jacobian (M, Q)."""
+    """Coordinates (Q,) that fit best, in a rig, with the problem that they solve and its last Jacobian (M, Q).
+
+    The search has ``ended`` where it has not merely come to the most evaluations that it may make.
+    """
 
     quantities: tuple[Quantity, ...]
     theta: Array
@@ -128,6 +190,7 @@ class Fit:
     jacobian: Array
     noise: Noise
     cost: float
+    ended: bool = True
 
     @property
     def covariance(self) -> Array:
@@ -136,18 +199,34 @@ class Fit:
 
 
 def search(problem: Problem, theta: Array, most: int) -> Fit:
-    """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations."""
+    """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations, again while weights change."""
     low, high = problem.limits
-    inside = np.clip(theta, low + 1e-6, high - 1e-6)
-    found: OptimizeResult = least_squares(
-        problem.residuals, inside, problem.jacobian, bounds=(low, high), x_scale=problem.spread, max_nfev=most, ftol=TOLERANCE,
-        xtol=TOLERANCE,
-    )  # fmt: skip
-    if problem.slopes is None or not np.isfinite(found.cost):
-        raise ValueError("the rig's parameters predict nothing of the log; allowed: parameters nearer to the laboratory's rig")
-    problem.settled(found.x)
-    noise = noise_from(problem.windows, problem.noise, problem.slopes, problem.settled(found.x)[1])
-    return Fit(problem.quantities, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost))
+    place = np.clip(theta, low + 1e-6, high - 1e-6)
+    with problem.explained():
+        for left in reversed(range(MOST_WEIGHTS)):
+            if not np.isfinite(problem.residuals(place)).all():
+                raise ValueError(problem.disagreement())
+            try:
+                found: OptimizeResult = least_squares(
+                    problem.residuals,
+                    place,
+                    problem.jacobian,
+                    bounds=(low, high),
+                    x_scale=problem.spread,
+                    max_nfev=most,
+                    ftol=TOLERANCE,
+                    xtol=TOLERANCE,
+                )
+            except ValueError as error:  # derivatives that are no numbers, in SciPy's words
+                raise ValueError(problem.disagreement()) from error
+            place = np.clip(found.x, low + 1e-6, high - 1e-6)
+            if not left or not problem.reweigh(found.x):
+                break
+        residual = problem.settled(found.x)[1]
+        noise = noise_from(problem.windows, problem.noise, problem.slopes, residual)
+    return Fit(
+        problem.quantities, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost), found.status > 0
+    )
 
 
 def fit(
@@ -156,8 +235,10 @@ def fit(
     """The parameters of a trial's rig; ``owner`` is the rig as its owner describes it, ``seed`` draws where to begin."""
     some = _spread_out(cut(trial, owner, SHORT))
     problem = Problem(some, guessed_noise(trial), owner, quantities, tick)
+    with problem.explained():
+        drawn = _best_drawn(problem, np.random.default_rng(seed))
     tried = []
-    for theta in (problem.centre, _best_drawn(problem, np.random.default_rng(seed))):
+    for theta in (problem.centre, drawn):
         tried.append(search(Problem(some, problem.noise, owner, quantities, tick), theta, MOST[0]))
     return refine(trial, min(tried, key=lambda one: one.cost), owner, quantities, tick)
 
@@ -171,9 +252,12 @@ def refine(trial: Trial, first: Fit, owner: Parameters, quantities: tuple[Quanti
     found = first
     for _ in range(MOST_ROUNDS):
         before = found
-        problem = Problem(cut(trial, found.rig), found.noise, owner, quantities, tick)
-        problem.begin_anew(found.rig, found.problem.offsets.sizes)
-        found = search(problem, coordinates(found.rig, quantities), MOST[1])
+        problem = Problem(cut(trial, found.rig, budget=found.problem.windows.budget), found.noise, owner, quantities, tick)
+        theta = coordinates(found.rig, quantities)
+        with problem.explained():
+            problem.begin_anew(found.rig, found.problem.offsets.sizes)
+            problem.reweigh(theta)
+        found = search(problem, theta, MOST[1])
         if _is_close(before, found, trial.period) and not outliers(problem.settled(found.theta)[1]).any():
             break
     return found

@@ -8,6 +8,8 @@ import tomli_w
 
 from baselines.identification.certainty import NORMAL, Certainty, certainty_of
 from baselines.identification.estimate import Fit, Tick, fit, refine
+from baselines.identification.force_offset import ForceOffset, force_offset
+from baselines.identification.log_columns import CHAMBERS
 from baselines.identification.noise import guessed_noise
 from baselines.identification.quantities import LATENCY, QUANTITIES, Quantity, value_of
 from baselines.identification.starts import Noise
@@ -44,7 +46,8 @@ class Row:
 @dataclass(frozen=True)
 class Identified:
     """``rows``, one per parameter; ``rig`` with their values; ``fit``, ``certainty`` of the fit of all parameters; ``noise`` as
-    the residuals have it, ``quick_noise`` as the log alone has it."""
+    the residuals have it, ``quick_noise`` as the log alone has it; ``notes`` on what of the log was left out; ``pull``, a
+    constant force that the log lacks."""
 
     rows: tuple[Row, ...]
     rig: Parameters
@@ -52,6 +55,8 @@ class Identified:
     certainty: Certainty
     noise: Noise
     quick_noise: Noise
+    notes: tuple[str, ...]
+    pull: ForceOffset
 
     @property
     def misfit(self) -> tuple[float, float]:
@@ -65,7 +70,13 @@ class Identified:
         lines.append(f"noise of pressures {self.noise.pressure:.4g} Pa, of positions {1e3 * self.noise.position:.4g} mm")
         lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
         if max(pressure, position) > MISFIT:
-            lines.append("the model leaves more than noise: hands, leaks or play that it does not know; see the residuals")
+            lines.append(
+                "the model leaves more than noise: hands, an offset of the force sensor, leaks or play that it does not know; "
+                "see the residuals"
+            )
+        lines += self._causes()
+        if not self.fit.ended:
+            lines.append("the search took all the evaluations that it may make, and may end before the best parameters")
         for row in self.rows:
             low, high = TUNED.get(row.name, (-inf, inf))
             if row.determined and not low <= row.value <= high:
@@ -79,9 +90,23 @@ class Identified:
             lines.append(f"least known: {named}; {direction.deviation:.2g} of what was unknown before")
         return lines
 
+    def _causes(self) -> list[str]:
+        """Sensors that are off by more than their owner knows, a line each."""
+        if self.pull.is_there:
+            return [self.pull.words()]  # which biases of the cells make up for in part
+        lines, known = [], self.rig.electronics.pressure_bias
+        offsets = self.fit.problem.offsets.biases
+        for name, bias in zip(CHAMBERS, offsets, strict=True):
+            if abs(bias) > max(BIASED * known, LEAST_BIAS):
+                lines.append(
+                    f"pressures_{name} seems to be {abs(bias):.2g} Pa too {'high' if bias > 0 else 'low'}, "
+                    f"electronics.pressure_bias is {known:g} Pa: a gauge pressure, or a cell whose zero has drifted"
+                )
+        return lines
+
     def write(self, path: Path, source: str) -> None:
         """Write the rig as TOML; its head says what is from the log ``source`` and what is not."""
-        head = [f"Identified by birthsim identify from {source}.", *self.words()]
+        head = [f"Identified by birthsim identify from {source}.", *self.notes, *self.words()]
         text = "".join(f"# {line}\n" for line in head)
         write_text(path, f"{text}\n{tomli_w.dumps(self.rig.to_dict())}")
 
@@ -93,6 +118,9 @@ swing, and so do those with a later tracker (``birthsim study wide-rigs``)."""
 
 MISFIT = 1.1
 """Residuals so many times larger than the noise are named."""
+
+BIASED, LEAST_BIAS = 3.0, 5e3
+"""Standard deviations and Pa from which the bias of a cell is named."""
 
 
 REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance", "mechanics.mode_frequency")
@@ -112,7 +140,8 @@ def identify(
     if given:
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
     whole = fit(trial, owner, seed, quantities, tick)
-    certainty = certainty_of(whole)
+    with whole.problem.explained():
+        certainty, pull = certainty_of(whole), force_offset(whole)
     found = tuple(one for one, known in zip(quantities, certainty.determined, strict=True) if known)
     last = whole if len(found) == len(quantities) or not found else refine(trial, whole, owner, found, tick)
     rig = last.rig if found else owner
@@ -127,7 +156,8 @@ def identify(
         rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(known)))
     changes = {row.name: row.value for row in rows if row.determined}
     noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
-    return Identified(tuple(rows), owner.replace({**changes, **noise}), last, certainty, last.noise, guessed_noise(trial))
+    rig, quick = owner.replace({**changes, **noise}), guessed_noise(trial)
+    return Identified(tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull)
 
 
 def _latency(one: Quantity, period: float, middle: float, deviation: float) -> tuple[float, float, float]:

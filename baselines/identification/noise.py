@@ -3,8 +3,8 @@
 import numpy as np
 
 from baselines.identification.starts import Noise, Slopes
-from baselines.identification.trial import Trial
-from baselines.identification.windows import Windows, fresh_rows
+from baselines.identification.trial import Trial, fresh_rows
+from baselines.identification.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 
 LEAST = Noise(1.0, 1e-7)
@@ -20,16 +20,19 @@ SOME = 48
 
 def guessed_noise(trial: Trial) -> Noise:
     """From third differences, which leave little of the motion."""
-    pressure, position = (_rms(values) for values in (trial.pressures, trial.positions[:, fresh_rows(trial)]))
+    pressure, position = (noise_of(values) for values in (trial.pressures, trial.positions[:, fresh_rows(trial.positions)]))
     return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
 
 
-def _rms(values: Array) -> float:
-    """Of the noise of values (C, N): of medians, which jumps do not move. White noise makes third differences (1 + 9 + 9 +
-    1)^(1/2) as large."""
+def noise_of(values: Array) -> float:
+    """RMS of the noise of values (C, N), NaN where there are none: of medians, which jumps do not move.
+
+    White noise makes third differences (1 + 9 + 9 + 1)^(1/2) as large.
+    """
     left = np.abs(np.diff(values, 3, axis=1)) / 20**0.5
     parts = np.array_split(left, max(1, left.shape[1] // SOME), axis=1)
-    return GAUSS * float(np.sqrt(np.mean([np.median(part) ** 2 for part in parts])))
+    sizes = [part[np.isfinite(part)] for part in parts]
+    return GAUSS * float(np.sqrt(np.mean([float(np.median(size)) ** 2 for size in sizes if len(size)] or [0.0])))
 
 
 def noise_from(windows: Windows, noise: Noise, slopes: Slopes, residual: Array) -> Noise:
@@ -38,8 +41,8 @@ def noise_from(windows: Windows, noise: Noise, slopes: Slopes, residual: Array) 
     last = pressures + windows.positions.shape[1] * 2
     found = []
     for part, counted, before in (
-        (slice(0, pressures), windows.pressures.size, noise.pressure),
-        (slice(pressures, last), 2 * int(windows.valid.sum()), noise.position),
+        (slice(0, pressures), float(np.sum(windows.pressure_weights**2)), noise.pressure),
+        (slice(pressures, last), 2 * float(np.sum(windows.position_weights**2)), noise.position),
     ):
         freedom = counted - float(np.sum(slopes.basis[:, part] ** 2))
         found.append(before * float(np.sum(residual[:, part] ** 2) / max(freedom, 1.0)) ** 0.5)

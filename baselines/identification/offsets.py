@@ -45,9 +45,16 @@ class Offsets:
         bias = np.tile(max(board.pressure_bias, LEAST) * np.eye(cells), (count, windows.length, 1))
         self._windows, self._bias, self._field = windows, bias, field
         self._columns = np.zeros((count, bias.shape[1] + field.shape[1] + len(FREE), cells + field.shape[2]))
-        self._columns[:, : bias.shape[1], :cells] = -bias / noise.pressure
-        self._columns[:, bias.shape[1] : -len(FREE), cells:] = -field / noise.position
+        heard = windows.pressure_weights.reshape(count, -1, 1)
+        seen = np.repeat(windows.position_weights, 2, axis=1)[..., None]
+        self._columns[:, : bias.shape[1], :cells] = -heard * bias / noise.pressure
+        self._columns[:, bias.shape[1] : -len(FREE), cells:] = -seen * field / noise.position
         self.sizes: Array = np.zeros(self._columns.shape[2])
+
+    @property
+    def biases(self) -> Array:
+        """What each pressure cell adds (4,), Pa."""
+        return np.asarray(self._bias[0, :4] @ self.sizes[:4])
 
     def corrected(self) -> Windows:
         """The windows as sensors without errors would have them."""

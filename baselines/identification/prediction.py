@@ -26,6 +26,7 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
     the valves are those of the first rig.
     """
     count, trial = len(windows.starts), windows.trial
+    windows.budget.spend(count * len(rigs) * windows.length * trial.period)
     columns = np.array([parameter_column(rig) for rig in rigs]).T
     late = np.array([rig.electronics.position_latency for rig in rigs]) / trial.period
     states, openings = states.copy(), admitted_openings(trial, columns[:, 0])

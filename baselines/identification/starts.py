@@ -48,10 +48,10 @@ class Noise:
 
 
 def residuals(windows: Windows, noise: Noise, pressures: Array, positions: Array) -> Array:
-    """Measured less predicted, over the noise, (V, W, R): pressures (V, W, K, 4), then positions (V, W, F, 2)."""
+    """Measured less predicted, over the noise, weighted, (V, W, R): pressures (V, W, K, 4), then positions (V, W, F, 2)."""
     shape = (*pressures.shape[:2], -1)
-    first = (windows.pressures - pressures) / noise.pressure
-    second = np.where(windows.valid[..., None], (windows.positions - positions) / noise.position, 0.0)
+    first = windows.pressure_weights * (windows.pressures - pressures) / noise.pressure
+    second = windows.position_weights[..., None] * (windows.positions - positions) / noise.position
     return np.concatenate([first.reshape(shape), second.reshape(shape)], axis=2)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter, savgol_filter
 
-from baselines.identification.trial import Trial
+from baselines.identification.budget import Budget
+from baselines.identification.trial import Trial, bridged, fresh_rows, numbers
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.dynamics import steps_in
@@ -29,6 +30,12 @@ SMOOTHED = 0.03
 NEAREST = 5
 """Position samples that are taken at least."""
 
+SETTLED = 0.03
+"""s in which the spools forget what their openings were; assumed, some time constants of theirs."""
+
+ENOUGH = 0.5
+"""Fraction of the usual measurements that a window needs."""
+
 FREE = (at.Y1, at.V1, at.Y2, at.V2, at.Z1, at.Z2, at.PP1, at.PN1, at.PP2, at.PN2, at.TP1, at.TN1, at.TP2, at.TN2)
 """Rows of the state that a window's start leaves free; the spools follow from the openings before it."""
 
@@ -39,7 +46,8 @@ class Windows:
 
     ``starts`` (W,) are rows of the trial. ``arrived`` (W, F) counts the periods from the start to each row at which a position
     sample newly arrived, and ``valid`` (W, F) is False beyond the last. ``pressures`` (W, K, 4) and ``positions`` (W, F, 2) are
-    the measurements, ``state`` (18, W) the guess of the start.
+    the measurements, ``state`` (18, W) the guess of the start. Residuals count with ``pressure_weights`` (W, K, 4) and
+    ``position_weights`` (W, F), which are 0 where nothing was measured. ``budget`` bounds how often they are predicted.
     """
 
     trial: Trial
@@ -50,35 +58,66 @@ class Windows:
     pressures: Array
     positions: Array
     state: Array
+    pressure_weights: Array
+    position_weights: Array
+    budget: Budget
 
     def some(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Windows:
         """The windows with the numbers ``chosen``, or where ``chosen`` (W,) is True."""
         return Windows(
             self.trial, self.length, self.starts[chosen], self.arrived[chosen], self.valid[chosen], self.pressures[chosen],
-            self.positions[chosen], self.state[:, chosen],
+            self.positions[chosen], self.state[:, chosen], self.pressure_weights[chosen], self.position_weights[chosen],
+            self.budget,
         )  # fmt: skip
 
 
-def cut(trial: Trial, rig: Parameters, length: float = LENGTH) -> Windows:
-    """Windows of a trial, without overlap, for a rig as far as it is known."""
+def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | None = None) -> Windows:
+    """Windows of a trial, without overlap, for a rig as far as it is known; ``ValueError`` where the log has too many gaps.
+
+    Those are left out in which, or ``SETTLED`` before which, openings or forces are unknown, and those with few measurements.
+    """
     period, rows = trial.period, len(trial.times)
     k, margin = max(8, round(length / period)), round(0.1 / period)
-    starts = np.arange(margin, rows - margin - k, k)
-    fresh = fresh_rows(trial)
+    fresh = fresh_rows(trial.positions)
     lag = round(rig.electronics.position_latency / period)
+    starts = _measured(trial, np.arange(margin, rows - margin - k, k), k, lag, fresh)
     own = [fresh[(fresh >= start + lag) & (fresh < start + k + lag)] for start in starts]
     most = max(map(len, own))
     arrived, valid = np.zeros((len(starts), most), dtype=np.intp), np.zeros((len(starts), most), dtype=np.bool_)
     for w, (start, found) in enumerate(zip(starts, own, strict=True)):
         arrived[w, : len(found)], valid[w, : len(found)] = found - start, True
     pressures = np.stack([trial.pressures[:, s : s + k].T for s in starts])
-    positions = trial.positions.T[starts[:, None] + arrived]
-    return Windows(trial, k, starts, arrived, valid, pressures, positions, _guess(trial, rig, starts, fresh))
+    positions = np.nan_to_num(trial.positions.T[starts[:, None] + arrived])
+    known = np.isfinite(pressures)
+    return Windows(
+        trial, k, starts, arrived, valid, np.where(known, pressures, 0.0), positions, _guess(trial, rig, starts, fresh),
+        known.astype(np.float64), valid.astype(np.float64), budget or Budget.of(trial),
+    )  # fmt: skip
 
 
-def fresh_rows(trial: Trial) -> NDArray[np.intp]:
-    """Rows at which a position sample has newly arrived: the position is another than in the row before."""
-    return np.flatnonzero(np.any(np.diff(trial.positions, axis=1) != 0, axis=0)) + 1
+def _measured(
+    trial: Trial, starts: NDArray[np.intp], k: int, lag: int, fresh: NDArray[np.intp]
+) -> NDArray[np.intp]:  # fmt: skip
+    """Those of ``starts`` whose windows of ``k`` rows can be predicted and have more than half of the measurements."""
+    lost = _before(np.zeros(len(trial.times), dtype=np.bool_) if trial.unknown is None else trial.unknown)
+    ends, settled = starts + k, np.maximum(starts - round(SETTLED / trial.period), 0)
+    driven = lost[ends] == lost[settled]
+    cells = _before(numbers(trial.pressures))
+    told = cells[ends] - cells[starts] > ENOUGH * k
+    count = np.searchsorted(fresh, ends + lag) - np.searchsorted(fresh, starts + lag)
+    some = fresh[np.clip(np.searchsorted(fresh, starts)[:, None] + np.arange(-NEAREST, NEAREST), 0, len(fresh) - 1)]
+    apart = np.sort(np.abs(some - starts[:, None]), axis=1)[:, NEAREST - 1]
+    followed = (count > ENOUGH * np.median(count)) & (apart <= np.maximum(2 * np.median(apart), SMOOTHED / trial.period))
+    kept: NDArray[np.intp] = starts[driven & told & followed]
+    if not len(kept):
+        words = f"in no stretch of {k * trial.period:.2g} s of it openings, pressures and positions are all measured"
+        raise ValueError(f"the log has too many gaps: {words}; allowed: a log with such stretches, best without gaps")
+    return kept
+
+
+def _before(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """How many of ``mask`` (T,) are True before each row (T + 1,)."""
+    return np.concatenate([[0], np.cumsum(mask)]).astype(np.intp, copy=False)
 
 
 def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArray[np.intp]) -> Array:
@@ -99,7 +138,7 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     for z, v, level in ((at.Z1, at.V1, at.FC1), (at.Z2, at.V2, at.FC2)):
         state[z] = np.tanh(state[v] / 0.01) * column[level] / column[at.BRISTLE_S0]
     wide = 2 * round(0.005 / period) + 3
-    smooth = savgol_filter(trial.pressures, wide, 2, axis=1)
+    smooth = savgol_filter(bridged(trial.pressures), wide, 2, axis=1)
     state[list(at.PRESSURES)] = smooth[:, starts]
     state[list(at.TEMPERATURES)] = column[at.TEMPERATURE]
     return state

@@ -2,20 +2,54 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from baselines.identification.force_offset import ForceOffset
 from baselines.identification.identified import Identified, Row
 from baselines.identification.starts import Noise
 from birthsim_env.physics.rig.parameters import Parameters
 
 NOISE = Noise(500.0, 1e-4)
+NO_FORCE = ForceOffset(np.array([0.2, 0.9]), np.array([0.01, 0.3]))
+
+
+def made(rows=(), noise=NOISE, pull=NO_FORCE, biases=(0.0, 900.0, -4000.0, 5000.0), ended=True):
+    fit = SimpleNamespace(problem=SimpleNamespace(offsets=SimpleNamespace(biases=biases)), ended=ended)
+    certainty = SimpleNamespace(weakest=())
+    return Identified(rows, Parameters(), fit, certainty, noise, NOISE, ("left out: a row",), pull)  # type: ignore[arg-type]
 
 
 def said(name, value, determined=True):
     """Lines about controllers that are tuned for other rigs, where one figure was found."""
-    row = Row(name, 3.0, value, 0.9 * value, 1.1 * value, determined)
-    found = Identified((row,), Parameters(), None, SimpleNamespace(weakest=()), NOISE, NOISE)  # type: ignore[arg-type]
+    found = made((Row(name, 3.0, value, 0.9 * value, 1.1 * value, determined),))
     return [line for line in found.words() if "tuned" in line]
+
+
+def warned(**differences):
+    """Lines that a good fit lacks."""
+    good = made().words()
+    return [
+        line
+        for line in made(**differences).words()
+        if line not in good and "residuals over" not in line and "noise of" not in line
+    ]
+
+
+def test_causes_of_a_bad_fit_are_named():
+    (line,) = warned(noise=Noise(600.0, 1e-4))
+    assert "offset of the force sensor" in line
+    (line,) = warned(pull=ForceOffset(np.array([-3.0, 0.5]), np.array([0.1, 0.1])))
+    assert "a constant force of (-3, 0.5) N acts on the rig" in line
+    (line,) = warned(biases=(0.0, -95e3, 0.0, 0.0))
+    assert line.startswith("pressures_N1 seems to be 9.5e+04 Pa too low")
+    (line,) = warned(ended=False)
+    assert "evaluations" in line
+
+
+def test_what_was_left_out_stands_in_the_file_of_the_rig(tmp_path):
+    made().write(tmp_path / "rig.toml", "log.csv")
+    assert (tmp_path / "rig.toml").read_text().splitlines()[1] == "# left out: a row"
 
 
 @pytest.mark.parametrize(("name", "inside", "outside"), [

@@ -1,17 +1,21 @@
 """birthsim identify as a user runs it: an experiment, its log, the rig; Ctrl-C."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from baselines.commands import identify
+from baselines.identification import budget
 from baselines.identification.identified import REMEMBER
 from baselines.identification.identified import identify as identify_trial
+from baselines.identification.log_file import write_trial
 from baselines.identification.trial import Trial
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from tests.console import call
 from tests.figures import caught
+from tests.identification.broken import changed, put
 from tests.identification.trials import OWNER, TRUE, part, trial
 
 
@@ -63,8 +67,6 @@ def test_a_log_that_is_read_by_options_and_what_is_said_of_it(
 
 @pytest.mark.slow
 def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    from baselines.identification.log_file import write_trial
-
     log, out, report = tmp_path / "log.parquet", tmp_path / "rig.toml", tmp_path / "report"
     write_trial(trial(), log, TRUE)
     drawn = caught(monkeypatch, written=True)
@@ -91,3 +93,19 @@ def test_a_rig_with_states_that_no_log_holds_is_refused(name: str) -> None:
     rig = OWNER.replace({name: field_of(name).metadata["worth"][1]})
     with pytest.raises(ValueError, match=f"{name} = .*; allowed for an identification: 0, "):
         identify_trial(part(trial(), 0, 2100), rig)
+
+
+def test_bad_rows_are_named_and_a_fit_without_end_is_no_word_of_a_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(budget, "TIMES", 2.0)
+    monkeypatch.setattr(budget, "AT_LEAST", 2.0)
+    log, out = tmp_path / "log.csv", tmp_path / "rig.toml"
+    write_trial(changed(put("positions", 2000, (12.0, -7.0))), log, OWNER)
+    status, printed, wrong = call("identify", monkeypatch, capsys, log, "--out", out)
+    assert (status, out.exists()) == (2, False)
+    assert printed.startswith(
+        "left out: position is outside of the workspace in 1 row (row 2000 at 2 s: (12, -7) m); allowed: "
+    )
+    assert re.search("disagree so much .*; allowed: columns in their places and units", wrong)
+    assert not re.search("SciPy|LAPACK|matrix|Traceback", wrong, re.IGNORECASE)

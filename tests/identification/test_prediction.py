@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from baselines.identification.prediction import predict
-from baselines.identification.trial import Trial
-from baselines.identification.windows import Windows, cut, fresh_rows, spools_at
+from baselines.identification.trial import Trial, fresh_rows
+from baselines.identification.windows import Windows, cut, spools_at
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
@@ -81,10 +81,10 @@ def test_spools_follow_from_the_openings_before() -> None:
 
 
 def test_positions_that_repeat_are_not_fresh() -> None:
-    rows = fresh_rows(trial())
+    rows = fresh_rows(trial().positions)
     rate = len(rows) / (trial().times[-1] - trial().times[0])
     assert abs(rate - TRUE.electronics.position_rate) < 1.0
-    assert len(fresh_rows(trial("ideal"))) == len(trial().times) - 1
+    assert len(fresh_rows(trial("ideal").positions)) == len(trial().times) - 1
 
 
 def integrated(windows: Windows, rig: Parameters, state: Array, periods: int) -> Array:

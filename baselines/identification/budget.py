@@ -1,0 +1,31 @@
+"""An end for every identification, whatever its log says: a budget of what is predicted."""
+
+from dataclasses import dataclass
+
+from baselines.identification.trial import Trial
+
+TIMES, AT_LEAST = 15_000.0, 60_000.0
+"""How often the duration of a log is predicted at most, and s that are predicted at most of a short one; good logs take some
+2,600 times their duration."""
+
+
+@dataclass
+class Budget:
+    """Seconds that may still be predicted, ``left``."""
+
+    left: float
+
+    @staticmethod
+    def of(trial: Trial) -> "Budget":
+        """The budget of a trial."""
+        return Budget(max(TIMES * float(trial.times[-1] - trial.times[0]), AT_LEAST))
+
+    def spend(self, seconds: float) -> None:
+        """Take ``seconds``; ``UnsettledError`` where that is more than what is left."""
+        self.left -= seconds
+        if self.left < 0:
+            raise UnsettledError
+
+
+class UnsettledError(Exception):
+    """A search does not come to its end within its budget."""

@@ -1,0 +1,58 @@
+"""A constant force that a log lacks: an offset of its force sensor, a cable that pulls, a hand that nobody logged."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from baselines.identification.certainty import score_products
+from baselines.identification.estimate import Fit
+from baselines.identification.starts import predicted
+from birthsim_env.physics.compiled.lanes import Array
+
+STEP = 0.1
+"""N of the differences."""
+
+SURE, LEAST = 4.0, 1.0
+"""Standard deviations and N from which a force is named; assumed."""
+
+
+@dataclass(frozen=True)
+class ForceOffset:
+    """The constant ``force`` (2,), N, that would make the predictions of a fit better, and its standard ``deviation`` (2,)."""
+
+    force: Array
+    deviation: Array
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the force is more than noise and more than is of interest."""
+        return bool(np.any((np.abs(self.force) > SURE * self.deviation) & (np.abs(self.force) > LEAST)))
+
+    def words(self) -> str:
+        """The force and what may be its cause."""
+        x, y = self.force
+        return (
+            f"a constant force of ({x:.2g}, {y:.2g}) N acts on the rig that the log lacks: an offset of the force sensor (tare "
+            "it), a cable that pulls, a hand that is not logged"
+        )
+
+
+def force_offset(fit: Fit) -> ForceOffset:
+    """One Gauss-Newton step of a fit whose parameters, start states and sensors' errors give way as well."""
+    problem = fit.problem
+    free, residual = problem.settled(fit.theta)
+    windows, slopes = problem.offsets.corrected(), problem.slopes
+    columns = []
+    for axis in range(2):
+        forces = windows.trial.forces + STEP * np.eye(2)[:, [axis]]
+        pushed = replace(windows, trial=replace(windows.trial, forces=forces))
+        columns.append((predicted(pushed, problem.noise, [fit.rig], free[None])[0] - residual) / STEP)
+    derivatives, bent = problem.offsets.unexplained(slopes.unexplained(np.stack(columns, axis=2)))
+    tall = np.concatenate([derivatives.reshape(-1, 2), bent, np.zeros((len(fit.theta), 2))])
+    every = np.hstack([fit.jacobian, tall])
+    covariance = np.linalg.inv(every.T @ every)
+    step = -covariance @ (every.T @ problem.residuals(fit.theta))
+    both = np.concatenate([problem.derivatives, derivatives], axis=2)
+    scores = score_products(residual + both @ step, both)
+    variance = np.maximum(np.diag(covariance), np.diag(covariance @ scores @ covariance))
+    return ForceOffset(step[-2:], np.sqrt(variance[-2:]))
