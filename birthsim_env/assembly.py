@@ -15,11 +15,12 @@ from birthsim_env.drawing.scene import checked_size
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
-from birthsim_env.parts.courses import check_drawn
+from birthsim_env.parts.courses import check_drawn, check_points
 from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
 from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.times import called, check_times
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, near, shown
 from birthsim_env.simulation import Simulation
@@ -164,9 +165,13 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
         raise ValueError(f"duration = {shown(duration)}; allowed: None or a positive number, at most {LONGEST:g} (s)")
     lasts = float(duration or table.duration)
     trajectory = default_reference if given["reference"] is None else trajectory_of(given["reference"], lasts)
-    check_drawn(trajectory, lasts, rig)
     hand = default_force if given["user_force"] is None else hand_of(given["user_force"], varied)
     stiffness = default_stiffness if given["stiffness"] is None else stiffness_of(given["stiffness"])
+    check_times("reference", given["reference"], trajectory.timed, lasts, duration is None)
+    check_times("user_force", given["user_force"], hand.timed, lasts, duration is None)
+    check_times("stiffness", given["stiffness"], stiffness.timed, lasts, duration is None)
+    check_points(called("reference", given["reference"]), trajectory, lasts, rig)
+    check_drawn(trajectory, lasts, rig)
     periods, threads = policy_periods(given["policy_period"], rig), threads_for(num_envs, given["num_threads"])
     parts = trajectory, hand, stiffness, sensors, chosen
     simulation = Simulation(num_envs, rig, ranges, *parts, periods, threads, given["force_sensor"])

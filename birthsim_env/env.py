@@ -109,7 +109,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       `"steps"`, or one that never stops moving: `"sine"`, `"noise"` and `"guided"`. The guided hand has mass, damper and
       spring, and holds the end effector.
     - `stiffness`: a number (N/m), a `StiffnessSchedule` of your own, or a CSV file of time, x, y, stiffness (N/m), which
-      `reference` takes too. A CSV file's heading names its columns; `"file.csv:t,a,b"` says how others are called.
+      `reference` takes too. A CSV file's heading names its columns; `"file.csv:t,a,b"` says how others are called. Times are
+      s since the episode begins. Between its rows a reference is smooth and stays between them, a force is linear.
     - `parameters`: a `Parameters`, the path of a TOML file that describes your rig, or what such a file holds:
       `{"mechanics": {"mass": 4.0}}`.
     - `policy_period` in s, a multiple of the control period of 1 ms up to 1 s; `duration` in s, rounded to whole policy steps.
@@ -124,8 +125,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Errors
     `TypeError` for arguments that there are not. `ValueError` naming the argument, its value and what is allowed: modes,
-    parameters, ranges, references that leave the workspace, actions that are not finite numbers in [-1, 1] of the right
-    shape.
+    parameters, ranges, references that leave the workspace, times that miss the episode, actions that are not finite numbers
+    in [-1, 1] of the right shape.
 
     ## Version history
     - Probe v2: the push begins after 3 s instead of 1 s, when the head is at rest, and the episode lasts 7 s instead of 5 s.

@@ -18,7 +18,7 @@ from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
-from birthsim_env.parts.courses import checked_start
+from birthsim_env.parts.courses import check_knots, checked_start
 from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.streams import begin, worlds
 from birthsim_env.parts.hands.user_forces import UserForce, forces_of
@@ -110,7 +110,8 @@ class Simulation(Instant):
         """Start new episodes in the lanes of a mask (N,): draw their world and put the pistons on the reference, in balance.
 
         ``position`` (2,), m, starts the end effector there, at rest, instead. Raises ``ValueError`` for a reference that
-        leaves the workspace within ``duration`` s, a position outside it, and at first for a rig that cannot carry its weight.
+        leaves the workspace within ``duration`` s, a position outside it, and at first for a rig too weak for its weight or a
+        hand that begins later.
         """
         chosen = np.flatnonzero(lanes)
         for block, streams in worlds(chosen, seeds, episodes):
@@ -128,8 +129,9 @@ class Simulation(Instant):
         motion = rows[:4] if position is None else np.repeat([*position, 0.0, 0.0], len(chosen)).reshape(4, -1)
         start = motion[:2]
         if not self._begun:
-            # The rig as described: that one of those drawn cannot carry its mass is part of the experiment.
+            # The rig as described: that one of those drawn cannot carry its mass is part of the experiment. So with the hand.
             require_carried(start, self.parameters)
+            check_knots(self.user_force, chosen, duration)
             self._begun = True
         inverse_geometry(start, self.parameters)  # refuses what is out of reach
         joints = np.empty((4, len(chosen)))

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.commands.settings import CONTROLLER, WORLD, Configured, Kind, RigFile, Seed, number, whole
-from baselines.identification.experiment import propose, read_plan
+from baselines.identification.experiment import DURATION, propose, read_plan
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log_columns import LogOptions
@@ -20,9 +20,6 @@ from baselines.logs.writing import WRITERS
 from baselines.registry import make_controller
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-
-DURATION = 12.0
-"""s of a proposed experiment; the table of docs/identify.md is made with as much."""
 
 ONLY_WITH = {
     **{"duration": "propose", "controller": "simulate", "sensors": "simulate"},

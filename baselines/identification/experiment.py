@@ -12,8 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from birthsim_env.files import write_text
+from birthsim_env.parts.courses import check_points
+from birthsim_env.parts.points import Through
+from birthsim_env.parts.times import unit_of
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector, inverse_geometry
+from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
 from birthsim_env.tables.columns import columns
@@ -40,8 +43,8 @@ ADDED = ("added_P1", "added_N1", "added_P2", "added_N2")
 NAMES = {"time": "s", "x": "m", "y": "m", **dict.fromkeys(ADDED, "1")}
 """Columns of a plan and their units; the last four are openings in [-1, 1] that are added to the law's."""
 
-SHORTEST, LONGEST = 4.0, 600.0
-"""s of a plan."""
+SHORTEST, DURATION, LONGEST = 4.0, 12.0, 600.0
+"""s of a plan: the shortest, one that is proposed, with which the table of docs/identify.md is made, and the longest."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +93,13 @@ def read_plan(path: Path, rig: Parameters) -> Plan:
     times, target, added = found[0], found[1:3], found[3:]
     if len(times) < 8:
         raise ValueError(f"{where} has {len(times)} rows; allowed: at least 8")
+    if not abs(times[0]) <= LONGEST:
+        guess = unit_of(times, DURATION)
+        raise ValueError(f"{where} begins at {times[0]:.10g} s{guess}; allowed: within {LONGEST:g} s of 0")
     if not SHORTEST <= times[-1] - times[0] <= LONGEST:
-        raise ValueError(f"{where} lasts {times[-1] - times[0]:.4g} s; allowed: {SHORTEST:g} to {LONGEST:g} s")
+        guess = unit_of(times, DURATION)
+        raise ValueError(f"{where} lasts {times[-1] - times[0]:.4g} s{guess}; allowed: {SHORTEST:g} to {LONGEST:g} s")
     if np.abs(added).max() > 1:
         raise ValueError(f"{where}: an added opening of {np.abs(added).max():g}; allowed: -1 to 1")
-    try:
-        inverse_geometry(target, rig)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from error
+    check_points(where, Through(times - times[0], target.T), times[-1] - times[0], rig)
     return Plan(times, target, added)

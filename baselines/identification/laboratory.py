@@ -11,7 +11,7 @@ from baselines.identification.experiment import Plan
 from baselines.identification.trial import Trial
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.loop.stage import Part
-from birthsim_env.parts.own_parts import Through
+from birthsim_env.parts.points import Through
 from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFNESS = 3000.0
@@ -38,7 +38,8 @@ def _run(
     plan: Plan, rig: Parameters, number: int, controller: Controller, sensors: str, seed: int, tick: Callable[[], Any],
     carry: Callable[[RestingRigs], Part] | None,
 ) -> Trial:  # fmt: skip
-    rows, path = np.zeros((REFERENCES, 1)), Through(plan.times, plan.target.T)
+    # A plan's rows are those of a multisine, which passes them between two of them; cut to its rows it would jerk there.
+    rows, path = np.zeros((REFERENCES, 1)), Through(plan.times, plan.target.T, within=False)
     rows[:2], rows[8:10], rows[10:12] = plan.target[:, :1], STIFFNESS, np.transpose([PNEUMATIC])
     loop = RestingRigs([rig], Reference(rows), controller, sensors, seed, name="law")
     period, start = loop.period, plan.times[0]

@@ -109,6 +109,7 @@ def _begin_worker(parent: int) -> None:
     for ending in _PARENTS:
         signal.signal(ending, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    warnings.simplefilter("ignore", UserWarning)  # the parent has warned of the user's files, once
     tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's
 
     def watch() -> None:

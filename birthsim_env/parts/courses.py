@@ -1,4 +1,6 @@
-"""The check of new episodes: what is asked for stays finite, reachable and stiff from their beginning to their end."""
+"""The check of new episodes: what is asked for stays finite, reachable and stiff from their beginning to their end.
+
+A user's points are checked as an environment is made, every one of them."""
 
 import copy
 import dataclasses
@@ -11,8 +13,11 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Motion, Setpoints
 from birthsim_env.parts.drawn.seeding import is_vectorised
+from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
+from birthsim_env.parts.points import Through
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.times import Timed, check_times
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import checked
@@ -94,6 +99,55 @@ def check_drawn(trajectory: Trajectory, duration: float, rig: Parameters) -> Non
             inverse_geometry(one.sample(np.full(lanes, instant))[:2], tight)
         except ValueError as error:
             raise ValueError(f"reference at {instant:.3g} s, of one that can be drawn: {error}") from None
+
+
+HASTE = 2.0
+"""Times the steady speed of a piston that points may ask for: for a moment air is compressed instead of let out; assumed."""
+
+
+def check_points(said: str, trajectory: Trajectory, duration: float, rig: Parameters) -> None:
+    """Points of a user's, of which those within ``duration`` s must be in the workspace of ``rig``, no farther apart than it
+    moves.
+
+    A piston's steady speed is that at which its chamber N lets its air out through a choked valve, C p0 / A. Raises
+    ``ValueError`` that begins with what is ``said`` of the argument and names the row of the point, or both.
+    """
+    if not isinstance(trajectory, Through):
+        return
+    inside = np.flatnonzero((trajectory.times >= 0.0) & (trajectory.times <= duration))
+    if len(inside) == 0:
+        return  # between two rows
+    times, points, first = trajectory.times[inside], trajectory.points[inside], int(inside[0]) + 1
+    try:
+        pistons = inverse_geometry(points.T, rig)
+    except ValueError:
+        for row, (instant, point) in enumerate(zip(times, points, strict=True), first):
+            try:
+                inverse_geometry(point, rig)
+            except ValueError as error:
+                raise ValueError(f"{said} at {instant:.6g} s (row {row}): {error}") from None
+    if trajectory.hurried:
+        return
+    air, choked = rig.air, rig.valves.sonic_conductance
+    steady = choked * air.reference_density * air.gas_constant * air.reference_temperature
+    for number, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+        way, most = np.abs(np.diff(pistons[number])), HASTE * steady / cylinder.area_n
+        if (fast := way > most * np.diff(times)).any():
+            k = int(fast.argmax())
+            ends = [
+                f"({x:.6g}, {y:.6g}) m at {t:.10g} s" for t, (x, y) in zip(times[k : k + 2], points[k : k + 2], strict=True)
+            ]
+            raise ValueError(
+                f"{said} goes from {ends[0]} to {ends[1]} (rows {first + k} and {first + k + 1}): piston {number + 1} at "
+                f"{way[k] / (times[k + 1] - times[k]):.3g} m/s; allowed: up to {most:.3g} m/s, so here {way[k] / most:.2g} s "
+                "or more from one to the other"
+            )
+
+
+def check_knots(hand: UserForce, lanes: NDArray[np.intp], duration: float) -> None:
+    """Raises ``ValueError`` where what a hand has drawn for ``lanes`` (L,) begins after ``duration`` s in all of them."""
+    if isinstance(hand, ForceProfile):
+        check_times("user_force", hand, Timed(np.empty(0), hand.first_knot(lanes)), duration, False)
 
 
 def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[Array], Array]:

@@ -2,7 +2,6 @@
 
 import importlib.util
 import inspect
-import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.loop.signals import Motion
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
-from birthsim_env.parts.references import Trajectory
+from birthsim_env.parts.points import Sampled, Through
+from birthsim_env.parts.references import LONGEST, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.parts.times import timed
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.values import is_finite, problem, shown
@@ -25,9 +24,6 @@ from birthsim_env.tables.columns import columns, table_file
 COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
 FORCE = {"time": "s", "Fx": "N", "Fy": "N"}
 """Columns of a user's tables, with their units."""
-
-GRID = 0.01
-"""s between the instants at which a function of time is taken; a spline of degree 5 runs through them."""
 
 
 def from_file(kind: str, text: str) -> Any:
@@ -60,54 +56,6 @@ def from_file(kind: str, text: str) -> Any:
     return getattr(module, attribute)
 
 
-@kernel
-def _spline(time: Array, breaks: Array, pieces: Array, rows: Array) -> None:
-    """``breaks`` (M + 1,), ``pieces`` (6, M, 2): coefficients, highest power first; at rest before and after."""
-    motion, first, last = Motion(rows), 0, breaks.shape[0] - 1
-    for i in range(time.shape[0]):
-        t = max(breaks[first], min(breaks[last], time[i]))
-        low, high = first, last
-        while high - low > 1:
-            middle = (low + high) // 2
-            if breaks[middle] <= t:
-                low = middle
-            else:
-                high = middle
-        s = t - breaks[low]
-        for axis in range(2):
-            value, slope, bend, jerk = 0.0, 0.0, 0.0, 0.0
-            for k in range(6):
-                jerk = jerk * s + 3.0 * bend
-                bend = bend * s + 2.0 * slope
-                slope = slope * s + value
-                value = value * s + pieces[k, low, axis]
-            inside = breaks[first] <= time[i] <= breaks[last]
-            motion.position[axis, i], motion.velocity[axis, i] = value, slope if inside else 0.0
-            motion.acceleration[axis, i], motion.jerk[axis, i] = (bend, jerk) if inside else (0.0, 0.0)
-
-
-class Through(Trajectory):
-    """Through positions (M, 2), m, at ``times`` (M,), s, which increase: a spline of degree 5, or as high as M points allow.
-
-    At rest before the first and after the last. SciPy's spline: what another processor makes of it may differ by rounding.
-    """
-
-    def __init__(self, times: Array, positions: Array) -> None:
-        from scipy.interpolate import make_interp_spline  # late: it would double the time of ``import birthsim_env``
-
-        degree = min(5, (len(times) - 2) // 2 * 2 + 1)  # an odd one
-        spline = make_interp_spline(times, positions, k=degree)
-        self._breaks: Array = np.unique(spline.t)
-        self._pieces: Array = np.zeros((6, len(self._breaks) - 1, 2))
-        for order in range(degree + 1):
-            self._pieces[5 - order] = spline(self._breaks[:-1], nu=order) / math.factorial(order)
-
-    def sample(self, time: Array) -> Array:
-        rows = np.empty((Motion.size, time.shape[0]))
-        _spline(time, self._breaks, self._pieces, rows)
-        return rows
-
-
 STEPPED = 250.0
 """N/m: a stiffness that differs by so much from the present setpoint becomes the next one; assumed, a twelfth of 3000 N/m."""
 
@@ -115,16 +63,21 @@ STEPPED = 250.0
 def stepped(times: Array, stiffness: Array) -> StiffnessSchedule:
     """Setpoints in steps of ``STEPPED`` or more that follow ``stiffness`` (M,), N/m, at ``times`` (M,), s.
 
-    A step restarts the count of settled time, as where a user changes the setpoint. The pneumatic stiffness stays at 4200 and
+    Rows before 0 and after ``LONGEST`` set nothing but what is asked for at 0. A step restarts the count of settled time, as
+    where a user changes the setpoint. The pneumatic stiffness stays at 4200 and
     2100 N/m, as in ``BirthSIM/Descent-v1``.
     """
     chosen = [0]
     for k, value in enumerate(stiffness):
         if abs(value - stiffness[chosen[-1]]) >= STEPPED:
             chosen.append(k)
+    begun = [k for k, following in zip(chosen, [*chosen[1:], None], strict=True) if following is None or times[following] > 0.0]
+    chosen = [begun[0], *(k for k in begun[1:] if times[k] <= LONGEST)]
     starts = (0.0, *(float(times[k]) for k in chosen[1:]))
     setpoints = tuple(float(stiffness[k]) for k in chosen)
-    return StiffnessSchedule(starts, setpoints, (4200.0,) * len(chosen), (2100.0,) * len(chosen))
+    schedule = StiffnessSchedule(starts, setpoints, (4200.0,) * len(chosen), (2100.0,) * len(chosen))
+    schedule.timed = timed(times, stiffness[:, None])
+    return schedule
 
 
 def _called(kind: str, call: str, function: Callable[..., Any], arguments: tuple[Any, ...], expected: str) -> Array:
@@ -186,13 +139,15 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
     expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
     if file := table_file(reference):
         rows = columns("reference", file, COURSE, ("time", "x", "y"))
-        return Through(rows[:, 0], rows[:, 1:])
+        try:
+            return Through(rows[:, 0], rows[:, 1:], duration)
+        except ValueError as error:
+            raise ValueError(f"reference = {str(file[0])!r}: {error}") from error
     reference = _made("reference", reference, Trajectory, expected)
     if isinstance(reference, Trajectory):
         return reference
-    times = np.linspace(0.0, duration, max(7, round(duration / GRID) + 1))
     wanted = "a function of time (s) that returns (x, y) in m"
-    return Through(times, np.array([_called("reference", f"function({t:g})", reference, (float(t),), wanted) for t in times]))
+    return Sampled(lambda time: _called("reference", f"function({time:g})", reference, (time,), wanted), duration)
 
 
 def stiffness_of(stiffness: Any) -> StiffnessSchedule:

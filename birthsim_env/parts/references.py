@@ -16,6 +16,7 @@ from birthsim_env.loop.rows import REFERENCE, Seen
 from birthsim_env.loop.signals import Motion
 from birthsim_env.loop.stage import Stage, table2
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
+from birthsim_env.parts.times import Timed
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -38,8 +39,10 @@ class Trajectory:
     A trajectory of your own overrides ``sample``, and the other two methods where it needs them. ``prepare(num_envs)`` is
     called once. ``begin(lane, rng)`` is called at the start of every episode of a lane, with that lane's own random stream.
     ``sample(time)`` gets the time of every lane since its episode began, s, (N,). It returns (8, N): x, y (m), vx, vy, ax, ay
-    and jerks jx, jy, consistent with each other.
+    and jerks jx, jy, consistent with each other. ``timed`` says when it does something, where that is known.
     """
+
+    timed: Timed | None = None
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
@@ -206,6 +209,7 @@ class Path(_Planned):
             raise ValueError(f"ends = {ends!r}; allowed: {SHORTEST:g} s or more after begins = {begins!r}")
         self.start, self.heading, self.length, self.radius, self.angle = start, heading, length, radius, angle
         self.begins, self.ends = begins, ends
+        self.timed = Timed(np.empty(0), begins)
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:

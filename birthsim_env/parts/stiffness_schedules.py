@@ -14,6 +14,7 @@ from birthsim_env.loop.signals import Motion, Setpoints
 from birthsim_env.loop.stage import Stage, numbers, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
+from birthsim_env.parts.times import Timed
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
@@ -36,8 +37,10 @@ class StiffnessSchedule:
     - ``closed_loop_xy`` (N/m), which couples the axes; its square must be below the product of their stiffnesses;
     - ``pneumatic1``, ``pneumatic2`` (N/m) for the cylinders.
 
-    ``transition`` (s) is how long a change of the pneumatic stiffness takes.
+    ``transition`` (s) is how long a change of the pneumatic stiffness takes. ``timed`` says when it changes something.
     """
+
+    timed: Timed | None = None
 
     def __init__(
         self,
@@ -75,6 +78,7 @@ class StiffnessSchedule:
             if not np.max(np.abs(across)) ** 2 < np.min(x) * np.min(y):
                 raise ValueError(f"closed_loop_xy {across!r}; allowed: below sqrt(Kclx Kcly), here of {x!r} and {y!r} (N/m)")
         self.pneumatic1, self.pneumatic2 = pneumatic1, pneumatic2
+        self.timed = Timed(np.array(times, dtype=np.float64), float(times[min(1, len(times) - 1)]))
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""

@@ -11,7 +11,10 @@ from studies.fuzz.mutations import Rng, damaged, plain
 
 
 def _csv(_: Any, rng: Rng, folder: Path, case: Case) -> None:
+    from birthsim_env.parts.courses import check_points
     from birthsim_env.parts.own_parts import hand_of, trajectory_of
+    from birthsim_env.parts.times import called, check_times
+    from birthsim_env.physics.rig.parameters import Parameters
 
     time = np.arange(int(rng.integers(1, 40))) * 0.1
     lines = ["time, x, y", *(f"{t},{0.5 + 0.01 * t:.4f},0.01" for t in time)]
@@ -25,9 +28,12 @@ def _csv(_: Any, rng: Rng, folder: Path, case: Case) -> None:
     path = written(case, folder / "ours.csv", damaged(rng, text) if rng.random() < 0.5 else text)
     if rng.random() < 0.5:
         trajectory = trajectory_of(path, 1.0)
-        assert trajectory.sample(np.zeros(2)).shape == (8, 2)
+        assert np.isfinite(trajectory.sample(np.linspace(-1.0, 5.0, 99))).all()
+        check_times("reference", path, trajectory.timed, 1.0, True)
+        check_points(called("reference", path), trajectory, 1.0, Parameters())
     else:
         hand = hand_of(path, False)
+        check_times("user_force", path, hand.timed, 1.0, True)
         hand.prepare(2)
         hand.begin(0, np.random.default_rng(0))
         assert np.isfinite(hand.force(np.zeros((1, 2)), np.zeros((2, 2)), np.zeros((2, 2)))).all()

@@ -28,7 +28,8 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.parts.own_parts import Through, stepped
+from birthsim_env.parts.own_parts import stepped
+from birthsim_env.parts.points import Through
 from birthsim_env.parts.references import LONGEST
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array

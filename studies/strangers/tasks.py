@@ -15,7 +15,7 @@ from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.loop.stage import Part
-from birthsim_env.parts.own_parts import Through
+from birthsim_env.parts.points import Through
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
@@ -90,7 +90,7 @@ def judged(rig: Parameters, carry: Callable[[RestingRigs], Part], believed: Para
     times = np.arange(0.0, TURN * TURNS + 0.5, 0.01)
     phase = 2 * np.pi * np.maximum(times - 0.5, 0.0) / TURN
     target = asked[:2] + RADIUS * np.array([np.sin(phase), np.cos(phase) - 1.0])
-    course = Through(times, target.T)
+    course = Through(times, target.T, within=False)
 
     def follow(loop: RestingRigs) -> list[Part]:
         def lead(_: int) -> None:

@@ -20,7 +20,7 @@ def round_about(t):
 
 @pytest.mark.parametrize("from_file", [False, True])
 def test_a_plain_position_becomes_a_trajectory_with_its_derivatives(from_file, tmp_path):
-    """A spline of degree 5 through samples every h: derivative n is off by about h^(6 - n) |f^(6)|, most at the ends."""
+    """Polynomials of degree 5 through samples every h: derivative n is off by about h^(5 - n) |f^(5)|, most at the ends."""
     if from_file:
         rows = [(t, *round_about(t)) for t in np.linspace(0, 8, 801)]
         np.savetxt(tmp_path / "circle.csv", rows, "%.17g", ",", header="time,x,y", comments="")

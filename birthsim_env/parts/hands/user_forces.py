@@ -7,12 +7,14 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import FORCE, MOTION, TIME, Seen, World
 from birthsim_env.loop.stage import Stage, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
+from birthsim_env.parts.times import Timed, timed
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -41,11 +43,12 @@ class UserForce:
     and again at the same instant where another lane starts anew. It may return one force per lane, (2, N).
 
     A component that changes faster than ``jump_rate``, N/s, counts as a jump: no controller can follow it, and
-    ``info["since_jump"]`` starts anew.
+    ``info["since_jump"]`` starts anew. ``timed`` says when it does something, where that is known.
     """
 
     closed_loop = False
     jump_rate = 150.0
+    timed: Timed | None = None
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
@@ -156,7 +159,8 @@ class ForceProfile(CompiledForce):
         if not (knots is None or isinstance(knots, (list, tuple))):
             raise ValueError(f"knots = {shown(knots)}; allowed: a list of (time, Fx, Fy)")
         self._fixed = knots or [(0.0, 0.0, 0.0)]
-        _checked_knots("knots", self._fixed)
+        fixed = _checked_knots("knots", self._fixed)[:, :, 0]
+        self.timed = timed(fixed[:, 0], fixed[:, 1:])
 
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
@@ -178,6 +182,10 @@ class ForceProfile(CompiledForce):
             for knot, values in zip(self._knots, columns, strict=False):
                 put(knot, lanes, values)
             self._counts[one] = len(columns)
+
+    def first_knot(self, lanes: NDArray[np.intp]) -> float:
+        """When the first knot of any of ``lanes`` (L,) is, s; 0 for a class that prepares no knots."""
+        return float(self._knots[0, 0].take(lanes).min()) if hasattr(self, "_knots") else 0.0
 
     def stage(self) -> Stage:
         return Stage(_interpolate, tables=(self._knots, self._counts))
@@ -228,6 +236,7 @@ class Ramp(ForceProfile):
         checked_number("begins", begins, "s", least=0.0, most=LONGEST)
         checked_number("rise", rise, "s", least=0.0, most=LONGEST)
         self.amplitude, self.angle, self.begins, self.rise = amplitude, angle, begins, rise
+        self.timed = Timed(np.empty(0), begins)
 
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
@@ -263,6 +272,7 @@ class Pulls(ForceProfile):
             checked_number(name, value, "s", least=0.0, most=LONGEST)
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
+        self.timed = Timed(np.empty(0), begins)
 
     def peak(self, size: Range, rng: np.random.Generator) -> Any:
         """Force of a pull, N, from its entry in ``sizes``."""
