@@ -1,9 +1,9 @@
 """Folders and files that appear whole or not at all, and folders that one process has to itself."""
 
+import errno
 import json
 import math
 import os
-import shutil
 import signal
 import threading
 from collections.abc import Iterator
@@ -11,25 +11,20 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-_PARTIAL = ".partial"
-"""Ending of the hidden names of what is not complete."""
+from birthsim_env.partials import place, shared, tidy_below
 
 ENDINGS = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
 """Signals that ask a process to end; Windows has two of them."""
 
 
 def make_folder(path: Path) -> Path:
-    """The folder ``path``, made if it is missing, without hidden files that killed processes left; ``ValueError`` where that
-    cannot be."""
+    """The folder ``path``, made if it is missing; ``ValueError`` where that cannot be."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
     except OSError as error:
         raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
-    for leftover in path.rglob(f".*{_PARTIAL}"):
-        if not _is_written(leftover):
-            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
     return path
 
 
@@ -37,13 +32,18 @@ def make_folder(path: Path) -> Path:
 def own_folder(path: Path) -> Iterator[Path]:
     """The folder ``path``, made if it is missing, which no other process has at the same time; ``ValueError`` where one has.
 
-    The system frees the folder when the process ends, whatever ends it.
+    The system frees the folder when the process ends, whatever ends it; then the next one removes what that one left. Two hosts
+    see each other where the disk shares its locks, as NFS does by default.
     """
     from filelock import FileLock, Timeout  # which loads asyncio
 
-    make_folder(path)
+    lock = make_folder(path) / ".lock"
+    new = not lock.exists()
     try:
-        with FileLock(path / ".lock", timeout=0):
+        with FileLock(lock, timeout=0):
+            if new:
+                shared(lock)
+            tidy_below(path)
             yield path
     except Timeout:
         said = f"--out {str(path)!r} is in use by another process; allowed: to wait for it, or another folder"
@@ -54,22 +54,21 @@ def own_folder(path: Path) -> Iterator[Path]:
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised.
 
-    It is on the disk before it has its name. A process that is killed leaves a hidden file, which ``make_folder`` removes.
+    It is on the disk before it has its name. A process that is killed leaves a hidden ``place``, and the next one that writes
+    there removes it.
     """
-    partial = _partial(path)
     try:
-        with partial.open("wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
+        with place(path.parent) as own:
+            with (own / path.name).open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            (own / path.name).replace(path)
     except OSError as error:
         if error.errno is not None:
             # A full disk does not say which file it had no room for, and others say the hidden name.
-            error.filename = str(path)
+            error.filename, error.filename2 = str(path), None
         raise
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -78,15 +77,35 @@ def whole_results(folder: Path) -> Iterator[Path]:
 
     Where something is raised, such as for a full disk, ``folder`` stays as it was.
     """
-    place = _partial(folder / "results")
-    place.mkdir()
-    try:
-        yield place
+    with place(folder) as own:
+        yield own
         with later_signals():
-            for path in sorted(place.iterdir()):
-                path.replace(folder / path.name)
-    finally:
-        shutil.rmtree(place, ignore_errors=True)
+            _join(own, folder)
+
+
+@contextmanager
+def whole_folder(folder: Path, name: str) -> Iterator[Path]:
+    """A place for a folder ``name``, at any depth, and for files beside its parents; at the end both join those in ``folder``.
+
+    ``folder / name`` appears by one rename, as the last, and is new: raises ``OSError`` where it is there by then.
+    """
+    with place(folder) as own:
+        yield own
+        steps = [own, *(own / one for one in reversed(Path(name).parents) if one.name)]
+        if (folder / name).exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(folder / name))
+        with later_signals():
+            for one in steps:
+                (folder / one.relative_to(own)).mkdir(exist_ok=True)
+                _join(one, folder / one.relative_to(own))
+            (own / name).rename(folder / name)
+
+
+def _join(own: Path, folder: Path) -> None:
+    """Rename the files of a folder into another one; folders stay where they are."""
+    for path in sorted(own.iterdir()):
+        if path.is_file():
+            path.replace(folder / path.name)
 
 
 @contextmanager
@@ -124,20 +143,3 @@ def finite(content: Any) -> Any:
     if isinstance(content, (list, tuple)):
         return [finite(value) for value in content]
     return None if isinstance(content, float) and not math.isfinite(content) else content
-
-
-def _partial(path: Path) -> Path:
-    """The hidden name of what this process writes and ``path`` will be."""
-    return path.with_name(f".{path.name}.{os.getpid()}{_PARTIAL}")
-
-
-def _is_written(partial: Path) -> bool:
-    """Whether the process that writes a hidden file may still run; on Windows, which cannot be asked, it may."""
-    if os.name == "nt":
-        return True
-    process = partial.name.removesuffix(_PARTIAL).rpartition(".")[2]
-    try:
-        os.kill(int(process) if process.isdecimal() else os.getpid(), 0)
-    except OSError as error:
-        return not isinstance(error, ProcessLookupError)  # it may be another user's
-    return True

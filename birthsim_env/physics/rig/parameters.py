@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import tomli_w
 
+from birthsim_env.files import write_text
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.sections import Air, Chambers, Cylinder, Friction, Geometry, Mechanics, Valves
@@ -134,7 +135,7 @@ class Parameters:
 
     def to_toml(self, path: str | Path) -> None:
         """Write every value to a TOML file, one table per part."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict(options=True)), encoding="utf-8")
+        write_text(Path(path), tomli_w.dumps(self.to_dict(options=True)))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
