@@ -1,8 +1,12 @@
 """birthsim export --to minari: episodes of a controller as a Minari dataset for offline learning, with its card."""
 
+import errno
 import os
+import re
+import shutil
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,7 +20,7 @@ from baselines.commands.settings import EPISODES, WORLD, Configured, Env, Seed, 
 from baselines.commands.worlds import check_environment, policy_of
 from baselines.registry import make_controller
 from birthsim_env import Parameters, __version__, normalized_score, reference_scores
-from birthsim_env.files import make_folder, write_text
+from birthsim_env.files import make_folder, whole_folder, write_text
 from birthsim_env.physics.compiled.lanes import Array
 
 PERIOD = 0.005
@@ -27,6 +31,9 @@ NOISE = 0.2
 
 LEVELS = {"expert": "admittance", "medium": "admittance", "paper": "backstepping", "random": None}
 """Level -> controller that acts at 200 Hz."""
+
+SPARE, OVERHEAD = 2**20, 1.5
+"""Bytes of a dataset without episodes, and bytes of it per byte of their arrays; both more than was ever seen."""
 
 LANES = 64
 """Episodes that run side by side."""
@@ -73,11 +80,11 @@ def main(settings: Settings) -> None:
     except ImportError as error:
         raise ValueError(f"{error}; a dataset needs pip install 'minari[hdf5]'") from error
     check_environment(settings.env)
-    os.environ["MINARI_DATASETS_PATH"] = str(make_folder(settings.out).resolve())
-    name = f"birthsim/{policy_of(settings.env)}/{settings.level}-v0"
-    if name in minari.list_local_datasets():
+    out, name = make_folder(settings.out).resolve(), f"birthsim/{policy_of(settings.env)}/{settings.level}-v0"
+    if (out / name).exists():
         raise ValueError(f"--out {str(settings.out)!r} has {name} already; allowed: another folder")
     episodes = list(recorded(settings.env, settings.level, range(settings.seed, settings.seed + settings.episodes)))
+    check_room(episodes, out)
     known, text = reference_scores(settings.env), card(settings, name, episodes)
     buffers = [
         EpisodeBuffer(
@@ -85,16 +92,37 @@ def main(settings: Settings) -> None:
         )
         for k, one in enumerate(episodes)
     ]  # fmt: skip
-    with warnings.catch_warnings():
+    with whole_folder(out, name) as place, disk_errors(settings.out / name), warnings.catch_warnings():
+        os.environ["MINARI_DATASETS_PATH"] = str(place)
         warnings.simplefilter("ignore", UserWarning)  # of an author without an address
         minari.create_dataset_from_buffers(
             name, buffers, made(settings.env, gymnasium.make), algorithm_name=LEVELS[settings.level] or "uniform actions",
             author="The BirthSIM developers", description=text, requirements=[f"birthsim=={__version__}"],
             ref_min_score=known["shut valves"]["return"], ref_max_score=known["best classical law"]["return"],
         )  # fmt: skip
-    write_text(settings.out / name / "README.md", text)
+        write_text(place / name / "README.md", text)
     print(text)
     print(f"written to {settings.out / name}/")
+
+
+def check_room(episodes: list[Recorded], folder: Path) -> None:
+    """``OSError`` where a disk has no room for the episodes: HDF5 ends the process there, with a fault of memory."""
+    arrays = (array for one in episodes for array in (one.observations, one.actions, one.rewards))
+    if shutil.disk_usage(folder).free < SPARE + OVERHEAD * sum(array.nbytes for array in arrays):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
+
+
+@contextmanager
+def disk_errors(dataset: Path) -> Iterator[None]:
+    """What HDF5 says of a full or broken disk, over several lines and as a ``RuntimeError``, becomes the system's own error."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        found = re.search(r"errno = (\d+)", str(error))
+        number = int(found[1]) if found else getattr(error, "errno", None)
+        if number is None:
+            raise
+        raise OSError(number, os.strerror(number), str(dataset)) from error
 
 
 def made(environment: str, make: Any, **arguments: Any) -> Any:

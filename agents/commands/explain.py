@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from baselines.bench.statistics import number
 from baselines.commands.settings import Configured
 from baselines.tables import aligned, markdown
-from birthsim_env.files import make_folder, write_json, write_text
+from birthsim_env.files import make_folder, whole_results, write_json, write_text
 
 
 @dataclass(kw_only=True)
@@ -50,8 +50,7 @@ def main(settings: Settings) -> None:
     correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]
     slopes = [float(np.polyfit(weight[1], weight[0], 1)[0]) for weight in weights]
     circles = [inspection.frictionless_circle(policy) for policy in policies]
-    folder = make_folder(settings.out)
-    draw_corrections(weights[0], correlations[0], inspection.friction_along_circle(policies[0]), folder)
+    folder, friction = make_folder(settings.out), inspection.friction_along_circle(policies[0])
     law = policies[0].settings.law
     laws = dict.fromkeys(("backstepping", law))  # the paper's, and the one underneath
     controllers: list[tuple[str, Any]] = [(name, make_controller(name, Parameters())) for name in laws]
@@ -83,9 +82,11 @@ def main(settings: Settings) -> None:
         title = f"Stiffness test at {setpoint:g} N/m on rigs drawn at random, {there[0]['cases']} pushes: median (95 %)."
         tables.append((title, head, felt))
     marked = [f"{title}\n\n{markdown(top, cells)}\n" for title, top, cells in tables]
-    write_text(folder / "residual.md", "\n".join(marked))
     content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
-    write_json(folder / "residual.json", content)
+    with whole_results(folder) as place:
+        draw_corrections(weights[0], correlations[0], friction, place)
+        write_text(place / "residual.md", "\n".join(marked))
+        write_json(place / "residual.json", content)
     for title, top, cells in tables:
         print(f"{title}\n\n{aligned(top, cells)}\n")
     print(f"written to {folder}/: correction.png and .svg, residual.md, residual.json")

@@ -1,7 +1,9 @@
 """Minari and d3rlpy: a dataset is written by one command, read back, played again, and learned from."""
 
+import os
 import subprocess
 import sys
+import time
 
 import d3rlpy
 import gymnasium as gym
@@ -34,6 +36,19 @@ def test_its_episodes_are_played_again_in_the_environment_that_it_names(dataset)
             seen, paid, terminated, truncated, _ = env.step(action)
             np.testing.assert_array_equal(seen, episode.observations[k + 1])
             assert (paid, terminated, truncated) == (episode.rewards[k], episode.terminations[k], episode.truncations[k])
+
+
+def test_a_killed_export_leaves_no_dataset_and_the_same_command_then_writes_it(tmp_path, monkeypatch):
+    command = [sys.executable, "-P", "-m", "birthsim", "export", "--to", "minari", "--episodes", "8", "--out", str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        while process.poll() is None and not any("main_data.hdf5" in inside for _, _, inside in os.walk(tmp_path)):
+            time.sleep(0.002)
+        process.kill()
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    assert minari.list_local_datasets() == {}
+    subprocess.run(command, check=True, capture_output=True)
+    assert len(list(minari.load_dataset(NAME).iterate_episodes())) == 8
+    assert [path.name for path in tmp_path.iterdir()] == ["birthsim"]
 
 
 def test_its_scores_are_the_projects(dataset):
