@@ -3,7 +3,6 @@
 ``birthsim study scores`` measures them and writes the file that lies beside this module.
 """
 
-import json
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Each
 from birthsim_env.physics.rig.values import shown
 
 FILE = Path(__file__).with_name("scores.json")
@@ -31,8 +32,8 @@ RIGS = {False: "nominal", True: "drawn"}
 
 @cache
 def _scores() -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
-    return content["scores"]  # type: ignore[no-any-return]
+    scores: dict[str, Any] = read_json("scores", FILE, {"scores": Each(dict)})["scores"]
+    return scores
 
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:

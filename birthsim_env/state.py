@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.physics.rig.json_reading import parse_json
+
 State = dict[str, NDArray[Any]]
 
 PLAIN = "plain"
@@ -146,7 +148,7 @@ def _from_json(value: Any) -> Any:
 
 def _decoded(state: State) -> dict[str, Any]:
     try:
-        plain = json.loads(state[PLAIN].tobytes())
+        plain = parse_json("state", state[PLAIN].tobytes(), dict, finite=False)
         return {
             **{name: np.array(value) for name, value in state.items() if name != PLAIN},
             **{name: _from_json(value) for name, value in plain.items()},

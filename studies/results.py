@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from birthsim_env.physics.compiled.sources import ROOT, hashes
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Each
 
 RESULTS = ROOT / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 ENGINE = (
     "baselines/work/", "baselines/commands/", "baselines/about.py", "birthsim_env/files.py",
+    "birthsim_env/partials.py", "birthsim_env/physics/rig/json_reading.py", "birthsim_env/physics/rig/schema.py",
     "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "birthsim_env/drawing/",
     "baselines/figures/", "studies/study.py", "studies/results.py", "studies/tables.py",
 )  # fmt: skip
@@ -24,6 +27,13 @@ ENGINE = (
 Content = dict[str, Any]
 """What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there
 before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, ``figures``, and hashes of ``sources``."""
+
+
+_SCHEMA = {
+    "date": str, "commit": str, "seconds": float, "settings": dict, "figures": (dict, list), "sources": Each(str),
+}  # fmt: skip
+MOST = 2**26
+"""Bytes of a result; the largest has a million."""
 
 
 def provenance(modules: tuple[str, ...]) -> Content:
@@ -48,10 +58,10 @@ def written(content: Any) -> str:
     return _lines(content) + "\n"
 
 
-def read_result(name: str, folder: Path = RESULTS) -> Content | None:
-    """The stored result of a study, if there is one."""
-    file = folder / f"{name}.json"
-    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+def read_result(name: str, folder: Path | None = None) -> Content | None:
+    """The stored result of a study, if there is one; of ``RESULTS``, or another folder."""
+    file = (folder or RESULTS) / f"{name}.json"
+    return read_json("result", file, _SCHEMA, MOST) if file.is_file() else None
 
 
 def changed(content: Content, modules: tuple[str, ...]) -> list[str]:

@@ -16,6 +16,7 @@ from baselines.commands.command import perform_with
 from baselines.commands.settings import Configured
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT
+from birthsim_env.physics.rig.values import shown
 from studies.door import OWN, STUDIES
 from studies.figures import figure
 from studies.results import changed, read_result
@@ -61,8 +62,9 @@ def state(name: str) -> str:
         return "not measured yet"
     files = changed(content, study.code)
     listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
-    other = {key: value for key, value in content["settings"].items() if value != json.loads(json.dumps(study.options[key]))}
-    said = "".join(f"; {key} = {value}, not {study.options[key]}" for key, value in other.items())
+    usual = json.loads(json.dumps(study.options))
+    other = {key: value for key, value in content["settings"].items() if key not in usual or value != usual[key]}
+    said = "".join(f"; {shown(key)} = {shown(value)}, not {usual.get(key, 'an option')}" for key, value in other.items())
     return (f"stale; changed: {listed}" if files else "fresh") + said
 
 

@@ -1,5 +1,6 @@
 """birthsim distill: recurrent students of privileged policies, where TEACHER/seed_0 ... hold one teacher for each student."""
 
+import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -8,10 +9,12 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 from tqdm import tqdm
 
+from baselines.bench.statistics import number
 from baselines.commands.settings import PROCESSES, Configured, RigFile, Seed, whole
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.files import finite, make_folder, own_folder, write_json
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.schema import fault
 
 try:
     from agents.policy.files import Policy, load_policy, save_policy
@@ -21,8 +24,8 @@ try:
 except ImportError as error:
     raise ImportError(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
 
-TAUGHT = ("environment", "sensors", "randomize", "validation_lanes")
-"""What a student's training has in common with its teacher's."""
+TAUGHT = {"environment": str, "sensors": str, "randomize": (bool, str), "validation_lanes": range(1, 2**16 + 1)}
+"""Name -> kind of what a student's training has in common with its teacher's."""
 
 
 @dataclass(kw_only=True)
@@ -59,16 +62,17 @@ def main(settings: Settings) -> None:
         teacher = load_policy(place)
         if not teacher.training.get("privileged", False):
             raise ValueError(f"--teacher: {str(place)!r} is not privileged; allowed: policies trained with privileged = true")
+        if problem := fault(teacher.training, TAUGHT, "training"):
+            raise ValueError(f"--teacher: {str(place)!r} does not say what it was trained on: {problem}")
         work.append((teacher, lessons, rig, settings.out / f"seed_{lessons.seed}", k % settings.jobs))
     make_folder(settings.out)
     results: dict[int, dict[str, Any]] = {}
     side_by_side(_one, work, settings.jobs, results.__setitem__)
     for k, (_, lessons, *_) in enumerate(work):
         figures, law = results[k]["policy"], results[k]["law"]
-        print(
-            f"seed {lessons.seed}: {figures['pooled_mm']:.2f} mm pooled, 95 % {figures['tail_mm']:.2f} mm, {figures['lost']} "
-            f"lost; law {law['pooled_mm']:.2f} mm"
-        )
+        errors = figures["pooled_mm"], figures["tail_mm"], law["pooled_mm"]
+        said = [number(math.nan if one is None else one) for one in errors]
+        print(f"seed {lessons.seed}: {said[0]} mm pooled, 95 % {said[1]} mm, {figures['lost']} lost; law {said[2]} mm")
     print(f"written to {settings.out}/")
 
 
@@ -79,7 +83,7 @@ def _one(teacher: Policy, lessons: Lessons, rig: Parameters, folder: Path, posit
     with own_folder(folder):
         for done in learning_curves([folder]):
             its = {name: done["settings"].get(name) for name in settings}
-            if its != settings or done["settings"].get("rig") != rig.to_dict():
+            if "policy" not in done or its != settings or done["settings"].get("rig") != rig.to_dict():
                 raise ValueError(f"{str(folder)!r} has a training with other settings; allowed: the same, or another folder")
             return done
         reached = _taught(teacher, lessons, rig, folder, settings, position)

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from birthsim_env.physics.rig.json_reading import parse_json
+from birthsim_env.physics.rig.values import shown
+
 Arrays = dict[str, NDArray[Any]]
 
 _KEY = "birthsim"
@@ -29,16 +32,17 @@ def unsealed(content: bytes, form: str) -> tuple[Arrays, dict[str, Any]]:
 
     Raises ``ValueError`` that says what is wrong with a content that has changed, or is of another format.
     """
+    size = int.from_bytes(content[:8], "little")
     try:
-        size = int.from_bytes(content[:8], "little")
-        about = json.loads(json.loads(content[8 : 8 + size])["__metadata__"][_KEY])
-        checksum, found = about.pop("sha256").encode(), about["format"]
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        header = parse_json("header", content[8 : 8 + size], {"__metadata__": {_KEY: str}})
+        about = parse_json("header", header["__metadata__"][_KEY], {"sha256": str, "format": str}, finite=False)
+    except ValueError as error:
         raise ValueError(f"no {form} or damaged") from error
+    checksum, found = about.pop("sha256").encode(), about["format"]
     if hashlib.sha256(content.replace(checksum, _BLANK, 1)).hexdigest().encode() != checksum:
         raise ValueError("damaged: its checksum is of another content")
     if found != form:
-        raise ValueError(f"of the foreign format {found!r}, not {form!r}")
+        raise ValueError(f"of the foreign format {shown(found)}, not {form!r}")
     try:
         return load(content), about
     except SafetensorError as error:

@@ -1,6 +1,5 @@
 """Policies of several training seeds: where they are, and what they reach together."""
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,8 @@ from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, jsonable, penalize_lost, quantile
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.values import near
+from birthsim_env.physics.rig.schema import fault
+from birthsim_env.physics.rig.values import near, shown
 
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 """Trained policies that come with the package, a folder per configuration and in it one per seed."""
@@ -51,20 +51,34 @@ def policy_folders(path: str | Path) -> list[Path]:
 
 
 def best_policy(path: str | Path) -> Path:
-    """The policy folder at ``path``, of several seeds the one that did best in validation; raises as ``policy_folders``."""
+    """The policy folder at ``path``, of several seeds the one that did best in validation.
+
+    Raises as ``policy_folders``, and ``ValueError`` where a policy says no error in mm that it reached, or none of several was
+    finite.
+    """
     folders = policy_folders(path)
-    return min(folders, key=_validation_error) if len(folders) > 1 else folders[0]
-
-
-def _validation_error(folder: Path) -> float:
-    """Pooled error of a policy in validation, mm; infinite where that says nothing."""
-    try:
-        error = load_policy(folder).training["reached"]["pooled_mm"]
-        return math.inf if error is None else float(error)
-    except (KeyError, TypeError) as missing:
+    if len(folders) == 1:
+        return folders[0]
+    errors = {folder: error for folder in folders if (error := _validation_error(folder)) is not None}
+    if not errors:
         raise ValueError(
-            f"policy = {str(folder)!r} does not say what it reached in validation; allowed: a folder that birthsim train wrote"
-        ) from missing
+            f"policy = {shown(str(path))} has no seed whose validation has a finite error (reached.pooled_mm); allowed: such "
+            "seeds, or the folder of one of them"
+        )
+    return min(errors, key=lambda folder: errors[folder])
+
+
+def _validation_error(folder: Path) -> float | None:
+    """Pooled error of a policy in validation, mm; None where that says nothing."""
+    training = load_policy(folder).training
+    problem = fault(training, {"reached": {"pooled_mm": (float, None)}}, "training")
+    error = None if problem else training["reached"]["pooled_mm"]
+    if not problem and error is not None and not 0 <= error < float("inf"):
+        problem = f"training.reached.pooled_mm = {shown(error)}; allowed: a finite error, mm"
+    if problem:
+        allowed = f"allowed: a folder that birthsim train wrote ({problem})"
+        raise ValueError(f"policy = {shown(str(folder))} does not say what it reached in validation; {allowed}")
+    return None if error is None else float(error)
 
 
 def pooled(values: Array) -> float:

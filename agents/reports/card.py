@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +14,15 @@ from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import penalize_lost, quantile
 from baselines.registry import make_controller
 from birthsim_env import __version__, reference_scores
+from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.scores import BEST, SENSORS
 
 TRAINING = "training.json"
 """What a training writes beside a policy."""
+
+_TRAINED_ON = {"settings": {"sensors": str, "randomize": (bool, str), "rig": dict, "algorithm?": (str, None)}}
 
 EPISODES, SEED = 64, 75_900_000
 """Of the comparison; no training, validation or design had these worlds."""
@@ -42,12 +46,12 @@ def compared(folder: Path) -> list[Evaluation]:
     All meet the same worlds, of the kind that its training had. Raises ``ValueError`` where the training left no settings.
     """
     policy = load_policy(folder)
+    about = settings_of(folder)
     try:
-        about = json.loads((folder / TRAINING).read_text(encoding="utf-8"))["settings"]
         sensors, randomize, rig = about["sensors"], about["randomize"], Parameters.from_dict(about["rig"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        problem = f"policy = {shown(str(folder))} says not what it was trained on ({error!r})"
-        raise ValueError(f"{problem}; allowed: a folder with {TRAINING}, as birthsim train writes it") from error
+    except ValueError as error:
+        problem = f"policy = {shown(str(folder))}: its {TRAINING} has no rig ({error})"
+        raise ValueError(f"{problem}; allowed: as birthsim train writes it") from error
     place = policy.environment.replace("Residual", "")
     best = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], bool(randomize))[BEST]["controller"]
     beside = [policy.settings.law, "backstepping", *["admittance-sensorless"] * (not policy.settings.force_sensor), best]
@@ -62,7 +66,7 @@ def compared(folder: Path) -> list[Evaluation]:
 def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> str:
     """The text of ``README.md`` beside a policy, from what ``compared`` found."""
     policy = load_policy(folder)
-    about = json.loads((folder / TRAINING).read_text(encoding="utf-8"))["settings"]
+    about = settings_of(folder)
     whom, columns = [one.controller for one in evaluations], [figures(one) for one in evaluations]
     rows = {key: [column[key] for column in columns] for key in FIGURES if np.isfinite(columns[0][key])}
     result = {
@@ -107,6 +111,12 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
         f"      birthsim evaluate --controller {' '.join(whom[1:])} residual --policy FOLDER --sensors {about['sensors']}",
         "",
     ])  # fmt: skip
+
+
+def settings_of(folder: Path) -> dict[str, Any]:
+    """The settings of the training that left a policy; ``ValueError`` where they are missing or damaged."""
+    settings: dict[str, Any] = read_json("policy", folder / TRAINING, _TRAINED_ON)["settings"]
+    return settings
 
 
 def figures(evaluation: Evaluation) -> dict[str, float]:

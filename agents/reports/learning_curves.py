@@ -1,6 +1,5 @@
 """Learning curves of several training seeds: interquartile mean and 95 % bootstrap interval over the seeds."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,8 @@ from matplotlib import pyplot as plt
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from baselines.figures.style import ACCENT, COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, log_ticks, save
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Listed
 
 FIGURES = (
     ("pooled_mm", "settled error (mm)"),
@@ -21,25 +22,20 @@ FIGURES = (
 )
 """Figures of a validation, where they say something."""
 
+_VALIDATION = {name: (float, None) for name, _ in FIGURES}
+_TRAINING = {
+    "settings": {"environment": str},
+    "law": _VALIDATION,
+    "curve": Listed({"steps": float, **_VALIDATION}, 1),
+    "policy?": {"pooled_mm": (float, None), "tail_mm": (float, None), "lost": int},
+}
+"""What a training leaves; null stands for what is not finite."""
+
 
 def learning_curves(folders: Sequence[Path]) -> list[dict[str, Any]]:
     """What ``training.json`` of each folder says, of those that have one; ``ValueError`` for a damaged one."""
     files = [folder / "training.json" for folder in folders]
-    return [_learning_curve(file) for file in files if file.is_file()]
-
-
-def _learning_curve(file: Path) -> dict[str, Any]:
-    try:
-        training = dict(json.loads(file.read_text(encoding="utf-8")))
-        for figures in (training["law"], *training["curve"]):
-            for name, _ in FIGURES:
-                _number(figures[name])
-        for steps in [training["curve"][0], *training["curve"]]:
-            float(steps["steps"])
-        str(training["settings"]["environment"])
-    except (LookupError, TypeError, ValueError) as error:
-        raise ValueError(f"{str(file)!r} is damaged ({error!r}); allowed: a file that birthsim train wrote") from error
-    return training
+    return [read_json("policy", file, _TRAINING) for file in files if file.is_file()]
 
 
 def over_seeds(trainings: Sequence[dict[str, Any]], figure: str) -> tuple[Array, Array]:

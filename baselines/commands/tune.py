@@ -38,8 +38,8 @@ from birthsim_env.files import own_folder, whole_results, write_json
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.reading import read_json
 from birthsim_env.physics.rig.values import is_within, shown
 
 if TYPE_CHECKING:
@@ -83,10 +83,9 @@ def start_of(path: Path | None, bounds: Bounds) -> Gains:
     """The gains of trial 0: those of a gains.json, or the middle of every range."""
     if path is None:
         return {name: math.sqrt(low * high) if low > 0 else high / 2 for name, (low, high) in bounds.items()}
-    content = read_json("--start", path)
-    gains: Any = content.get("gains") if isinstance(content, dict) else None
+    gains = read_json("--start", path, {"gains": dict})["gains"]
     for name, (low, high) in bounds.items():
-        if not isinstance(gains, dict) or name not in gains:
+        if name not in gains:
             raise ValueError(f"--start {str(path)!r} lacks {name!r}; allowed: JSON with gains: {', '.join(bounds)}")
         if not is_within(gains[name], least=low, most=high):
             raise ValueError(f"--start {str(path)!r} has {name} = {shown(gains[name])}; allowed: {low:g} to {high:g}")

@@ -16,8 +16,12 @@ import birthsim_env
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.files import finite, later_signals, write_json
 from birthsim_env.physics.compiled.sources import hashes
+from birthsim_env.physics.rig.json_reading import read_json
 
 Result = dict[str, Any]
+
+MOST = 2**28
+"""Bytes of a piece; those with a trace of 64 episodes have a few million."""
 
 
 @dataclass(frozen=True)
@@ -105,10 +109,11 @@ def _write(path: Path, task: Task, result: Result) -> None:
 def _read(path: Path) -> Result | None:
     """The result in a file; None where there is none, and where it is not as it was written."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return content["result"] if content["sha256"] == _digest(content["result"]) else None
-    except (FileNotFoundError, ValueError, KeyError, TypeError, RecursionError):
+        content = read_json("piece", path, {"result": dict, "sha256": str}, MOST)
+    except ValueError:
         return None
+    result: Result = content["result"]
+    return result if content["sha256"] == _digest(result) else None
 
 
 def _digest(content: Any) -> str:

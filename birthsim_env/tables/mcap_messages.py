@@ -1,7 +1,6 @@
 """Messages of an MCAP file, one after the other, of which no more is unpacked than a limit allows."""
 
 import io
-import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,6 +8,8 @@ import lz4.frame
 import zstandard
 from mcap.records import Channel, Chunk, Message
 from mcap.stream_reader import StreamReader
+
+from birthsim_env.physics.rig.json_reading import parse_json
 
 
 def json_messages(content: bytes, most: int, longest: int) -> Iterator[tuple[str, int, Any]]:
@@ -27,7 +28,7 @@ def json_messages(content: bytes, most: int, longest: int) -> Iterator[tuple[str
                 continue
             if len(record.data) > longest:
                 raise ValueError(f"a message of {channel.topic} has {len(record.data)} bytes; allowed: up to {longest}")
-            yield channel.topic, record.log_time, json.loads(record.data)
+            yield channel.topic, record.log_time, parse_json(f"a message of {channel.topic}", record.data, dict, finite=False)
 
 
 def _records(content: bytes, most: int) -> Iterator[object]:

@@ -1,8 +1,7 @@
 """Logs from what the commands write: recordings, evaluations, and the traces in an evaluation's pieces."""
 
 import base64
-import json
-from collections.abc import Callable
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,11 @@ import numpy as np
 from baselines.bench.measures import TRACE
 from baselines.logs.log import Column, Event, Log, Series
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.reading import named
+from birthsim_env.physics.rig.schema import Each, Listed, fault
+from birthsim_env.physics.rig.values import shown
 from birthsim_live.logs.recording import EVENTS, SLICES, SUFFIX, load_recording
 
 _PLANE, _CYLINDERS, _CHAMBERS = ("_x", "_y"), ("_1", "_2"), ("_P1", "_N1", "_P2", "_N2")
@@ -37,21 +40,38 @@ FIELDS = {
 """Field of a recording -> unit, meaning, and what its columns' names end with."""
 
 
+_NUMBERS = Listed((float, None))
+_EVALUATION = {
+    "rig": dict,
+    "arguments": dict,
+    "results": Listed({
+        "controller": str, "seeds": Listed(range(-(2**63), 2**63), 1), "lost": Listed(bool), "success": Listed(bool),
+        "required_strength_ratio": _NUMBERS, "units": Each(str), "episodes": Each(_NUMBERS), "returns": Each(_NUMBERS),
+    }, 1),
+}  # fmt: skip
+_PIECE = {
+    "settings": {"controller": str, "environment": str, "rig": dict, "world": {"parameters?": dict}},
+    "result": {"seeds": Listed(int, 1), "trace": {"float32": str, "shape": Listed(range(1, 2**31))}},
+}
+"""What files hold of what is read here."""
+
+MOST = 2**28
+"""Bytes of a JSON file."""
+
+
 def read_log(path: Path) -> Log:
     """The log of a file; ``ValueError`` that names it and what is wrong."""
     if path.suffix == SUFFIX:
         return _recording(path)
+    content = read_json("file", path, dict, MOST)
+    read, schema = (_piece, _PIECE) if "result" in content else (_evaluation, _EVALUATION)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        read: Callable[[Any], Log] = _piece if "result" in content else _evaluation
+        if problem := fault(content, schema):
+            raise ValueError(problem)
         return read(content)
-    except OSError as error:
-        raise ValueError(f"file = {str(path)!r} cannot be read: {error.strerror or error}") from error
-    except Exception as error:
-        # Damage trips json, NumPy and dictionaries in a dozen ways.
-        problem = f"{type(error).__name__}: {error}".splitlines()[0]
+    except ValueError as error:
         raise ValueError(
-            f"file = {str(path)!r} is damaged or foreign ({problem}); allowed: a recording of birthsim live ({SUFFIX}), "
+            f"file = {named(path)} is damaged or foreign: {error}; allowed: a recording of birthsim live ({SUFFIX}), "
             "evaluation.json of birthsim evaluate, or a piece of one, which holds traces"
         ) from error
 
@@ -100,6 +120,8 @@ def _evaluation(content: Any) -> Log:
             "required_strength_ratio": np.array(result["required_strength_ratio"], dtype=np.float64),
         }
         for name, numbers in result["episodes"].items():
+            if name not in result["units"]:
+                raise ValueError(f"{shown(name)} has no unit; allowed: units of all metrics")
             columns[name] = Column(result["units"][name], name.replace("_", " ") + " of the episode")
             values[name] = np.array(numbers, dtype=np.float64)
         for discount, numbers in result["returns"].items():
@@ -107,10 +129,10 @@ def _evaluation(content: Any) -> Log:
             values[f"return_{discount}"] = np.array(numbers, dtype=np.float64)
         times = np.arange(len(values["seed"]), dtype=np.float64)
         if any(column.shape != times.shape for column in values.values()):
-            raise ValueError(f"episodes of {result['controller']} are not as many in all columns")
+            raise ValueError(f"episodes of {shown(result['controller'])} are not as many in all columns")
         series.append(Series(f"/evaluation/{result['controller']}", times, values))
-    if not series or any(one.values.keys() != columns.keys() for one in series):
-        raise ValueError("no results, or controllers with other metrics than others")
+    if any(one.values.keys() != columns.keys() for one in series):
+        raise ValueError("controllers with other metrics than others")
     return Log(columns, series, [], {"rig": content["rig"], "arguments": content["arguments"]})
 
 
@@ -118,7 +140,10 @@ def _piece(content: Any) -> Log:
     """The tracking errors over time of a piece's episodes, one topic per seed."""
     settings, result = content["settings"], content["result"]
     trace = result["trace"]
-    errors = np.frombuffer(base64.b64decode(trace["float32"]), dtype="<f4").reshape(trace["shape"]).astype(np.float64)
+    errors = np.frombuffer(base64.b64decode(trace["float32"]), dtype="<f4")
+    if trace["shape"][1:] != [len(result["seeds"]), 2] or math.prod(trace["shape"]) != errors.size:
+        raise ValueError(f"a trace of shape {shown(trace['shape'])}; allowed: times, seeds, x and y")
+    errors = errors.reshape(trace["shape"]).astype(np.float64)
     rig = Parameters.from_dict(settings["world"].get("parameters", settings["rig"]))
     period = rig.electronics.control_period
     times: Array = max(1, round(TRACE / period)) * period * np.arange(len(errors), dtype=np.float64)

@@ -24,8 +24,11 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.json_reading import parse_json
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.reading import read
+from birthsim_env.physics.rig.reading import named, read
+from birthsim_env.physics.rig.schema import Listed
+from birthsim_env.physics.rig.values import problem
 
 FIELDS = {
     "time": 1, "episode_time": 1, "joints": 2, "position": 2, "velocity": 2, "target": 2, "compliant": 2, "scenario_force": 2,
@@ -60,6 +63,7 @@ EVENTS = ("settings", "path", "lost", "second_lost")
 FIRST_COLUMNS = list(FIELDS)[: list(FIELDS).index("friction")]
 """What older files hold; they play with NaN in place of the rest."""
 
+_CHUNK = {"events": Listed(dict)}
 _HEAD = struct.Struct("<II")
 
 
@@ -98,9 +102,9 @@ def load_recording(path: str | Path) -> Recording:
         events = [event for said, _ in chunks[1:] for event in said["events"]]
         return _checked(np.concatenate([numbers for _, numbers in chunks]), header, events)
     except Exception as error:
-        # Damage trips struct, zlib, json and NumPy in a dozen ways.
+        # Damage trips struct, zlib and NumPy in a dozen ways.
         raise ValueError(
-            f"recording = {str(path)!r} is damaged or foreign ({error}); allowed: what birthsim live wrote"
+            f"recording = {named(path)} is damaged or foreign ({problem(error)}); allowed: what birthsim live wrote"
         ) from error
 
 
@@ -129,7 +133,7 @@ def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
         ):
             if count > most:
                 raise ValueError(f"it holds more than {most} {name}; allowed: up to {most}")
-        yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64)
+        yield parse_json("a chunk", said, _CHUNK if chunks > 1 else dict), np.frombuffer(rows, dtype="<f8").astype(np.float64)
 
 
 def _checked(numbers: Array, header: Any, events: list[Any]) -> Recording:

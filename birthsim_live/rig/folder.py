@@ -13,6 +13,7 @@ import numpy as np
 from baselines.about import RESIDUAL
 from birthsim_build.faces.module import write_module
 from birthsim_build.image import Words
+from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.words import controller_choice
 
@@ -33,7 +34,7 @@ class Packed:
 def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[str] = ()) -> Packed:
     """What was built where that serves, else ``pack``; ``policies``, folders, are choices besides those that are shipped, and
     so are controllers that are ``asked`` for by name."""
-    content = json.loads((PAGE / "rig" / "pack.json").read_text(encoding="utf-8"))
+    content = read_json("page", PAGE / "rig" / "pack.json", {"index": dict, "hello": {"choices": {"controller": list}}})
     built = Packed(content, content.pop("index"), np.fromfile(PAGE / "rig" / "loop.bin", dtype=np.int64))
     known = {one["name"] for one in content["hello"]["choices"]["controller"]}
     others = [name for name in dict.fromkeys([*asked, *(f"{RESIDUAL}:{one}" for one in policies)]) if name not in known]

@@ -9,7 +9,6 @@ An error that compiled code would not raise, such as the root of a negative numb
 
 import gc
 import importlib
-import json
 import math
 import os
 import resource
@@ -28,9 +27,13 @@ from cyclopts import Parameter
 
 from baselines.commands.command import perform_with
 from baselines.commands.settings import MANY, Configured, number, whole
+from birthsim_env.files import write_json
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Each
 from studies.mutation.changes import mutants_of
 from studies.mutation.modules import MODULES, files_of
 from studies.mutation.uncompiled import switch_off
+from studies.results import MOST
 
 LIMIT = 40.0
 """CPU seconds of one test, uncompiled, beyond which it is left out (``--limit``). The balance of the chambers needs 25."""
@@ -116,7 +119,7 @@ class Tester:
     def __init__(self, options: Settings, report: Callable[[str, dict[str, Any]], None]) -> None:
         self.modules, self.every, self.report = options.module or list(MODULES), options.every, report
         self.limit, self.budget = options.limit, options.budget
-        self.again = json.loads(options.again.read_text()) if options.again else {}
+        self.again = read_json("--again", options.again, Each(dict), MOST) if options.again else {}
         self.measured: dict[str, tuple[str | None, float]] = {}
 
     @pytest.hookimpl(tryfirst=True)
@@ -194,14 +197,14 @@ def print_results(module: str, results: dict[str, Any], before: dict[str, Any]) 
 
 def main(options: Settings) -> None:
     """Run the tests."""
-    before = json.loads(options.before.read_text()) if options.before else {}
+    before = read_json("--before", options.before, Each(dict), MOST) if options.before else {}
     switch_off()
     found = {}
 
     def report(module: str, results: dict[str, Any]) -> None:
         found[module] = results
         if options.out:
-            options.out.write_text(json.dumps(found, indent=1))
+            write_json(options.out, found)
         print_results(module, results, before.get(module, {}).get("mutants", {}))
 
     files = sorted({str(path) for module in options.module or MODULES for path in files_of(module)})

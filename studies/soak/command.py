@@ -19,6 +19,7 @@ from baselines.commands.settings import Configured, Seed, whole
 from baselines.work.side_by_side import ONE_THREAD
 from baselines.work.tasks import code_stamp
 from birthsim_env.files import make_folder, write_json, write_text
+from birthsim_env.physics.rig.json_reading import parse_json
 from studies.alone import only_under
 from studies.soak.laps import LANES, STEPS, run
 
@@ -31,16 +32,16 @@ Laps = list[dict[str, Any]]
 def stored(path: Path, setting: dict[str, Any]) -> Laps:
     """The laps of an interrupted soak; ``ValueError`` where the file is of another."""
     if not path.is_file():
-        path.write_text(json.dumps(setting) + "\n", encoding="utf-8")
+        write_text(path, json.dumps(setting) + "\n")
         return []
-    head, *lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    if json.loads(head) != setting:
+    head, *lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True) or [""]
+    if parse_json(f"laps = {str(path)!r}", head, dict) != setting:
         raise ValueError(f"{path} is of other code or another seed; allowed: another --out")
     # A kill leaves half a line at the end.
     whole = [line for line in lines if line.endswith("\n")]
     if len(whole) < len(lines):
         write_text(path, head + "".join(whole))
-    return [json.loads(line) for line in whole]
+    return [parse_json(f"laps = {str(path)!r}", line, dict) for line in whole]
 
 
 def growth(laps: Laps) -> float:

@@ -3,11 +3,12 @@
 birthsim study mutation --out out/mutation.json && birthsim study verification mutation out/mutation.json
 """
 
-import json
 import tomllib
 from pathlib import Path
 from typing import Any
 
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Each
 from studies.mutation.modules import MODULES, files_of
 from studies.verification import sources
 
@@ -44,7 +45,7 @@ def summary(results: dict[str, Any]) -> dict[str, Any]:
 def take(path: Path) -> None:
     """Put the modules of a report of ``birthsim study mutation`` in the place of their older measurements."""
     stored = sources.load("mutation") if (sources.MEASURED / "mutation.json").is_file() else {}
-    new = stored | summary(json.loads(path.read_text(encoding="utf-8")))
+    new = stored | summary(read_json("mutation", path, Each(dict)))
     sources.keep("mutation", {module: new[module] for module in MODULES if module in new})
 
 

@@ -14,8 +14,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Each, Listed
 from studies.mutation.modules import MODULES
 from studies.mutation.uncompiled import SETTINGS, switch_off
+from studies.results import MOST
 from studies.verification import sources
 
 
@@ -32,7 +35,7 @@ def measure() -> dict[str, Any]:
         )
         if done.returncode:
             raise RuntimeError(f"tests uncompiled ended with {done.returncode}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
-        files = json.loads((there / "coverage.json").read_text(encoding="utf-8"))["files"]
+        files = read_json("coverage", there / "coverage.json", {"files": Each(dict)}, MOST)["files"]
     found = {}
     for path in map(sources.path_of, MODULES):
         total = files[path]["summary"]
@@ -53,7 +56,7 @@ def main(folder: Path) -> int:
     switch_off()
     import pytest
 
-    tests = json.loads((folder / "tests.json").read_text(encoding="utf-8"))
+    tests = read_json("tests", folder / "tests.json", Listed(str))
     status = pytest.main(["-q", "--tb=short", "--no-header", "-p", "no:xdist", "-p", "no:cacheprovider", *tests])
     watch.stop()
     watch.json_report(outfile=str(folder / "coverage.json"))

@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from birthsim_env.files import write_text
+from birthsim_env.physics.rig.json_reading import read_json
+
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = Path(__file__).parent / "measured"
 """Folder of the stored measurements, one JSON file each."""
@@ -51,13 +54,13 @@ def commit() -> str:
 
 def load(name: str) -> dict[str, Any]:
     """A stored measurement by its name."""
-    content: dict[str, Any] = json.loads((MEASURED / f"{name}.json").read_text(encoding="utf-8"))
+    content: dict[str, Any] = read_json("measured", MEASURED / f"{name}.json", dict)
     return content
 
 
 def keep(name: str, content: dict[str, Any]) -> None:
     """Store a measurement under its name."""
-    (MEASURED / f"{name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_text(MEASURED / f"{name}.json", json.dumps(content, indent=1) + "\n")
 
 
 def defined(path: Path) -> set[str]:

@@ -3,7 +3,7 @@
 import pytest
 
 from birthsim_env.physics.compiled.sources import ROOT, hashes
-from studies import shelf
+from studies import results, shelf
 from studies.results import changed, provenance, read_result, written
 from tests.console import call
 
@@ -12,7 +12,8 @@ MODULE = "studies.stability.stiffest"
 
 def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_path):
     assert read_result("one", tmp_path) is None
-    (tmp_path / "one.json").write_text(written(provenance((MODULE,)) | {"figures": [["a", 2.0], ["b", None]]}))
+    found = {"seconds": 1.0, "settings": {}, "figures": [["a", 2.0], ["b", None]]}
+    (tmp_path / "one.json").write_text(written(provenance((MODULE,)) | found))
     result = read_result("one", tmp_path)
     assert result["figures"] == [["a", 2.0], ["b", None]]
     assert len(result["commit"]) == 40
@@ -28,6 +29,21 @@ def test_a_package_that_a_result_depends_on_names_none_of_a_later_one_for_it():
     """``birthsim_env.learned`` names ``agents.residual.env``, which counts for what imports ``agents`` alone."""
     assert not any(path.startswith("agents/") for path in hashes("birthsim_env.learned"))
     assert "agents/residual/env.py" in hashes("agents.residual.env", "birthsim_env.learned")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"a":' * 9000, '{"date": "x"}', "\xff"])
+def test_a_damaged_result_is_named(text, tmp_path, monkeypatch):
+    monkeypatch.setattr(results, "RESULTS", tmp_path)
+    (tmp_path / "circle.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(ValueError, match=r"^result = .*circle\.json' is damaged.*; allowed: "):
+        shelf.state("circle")
+
+
+def test_settings_that_a_study_no_longer_has_are_told(monkeypatch):
+    content = read_result("circle")
+    content["settings"]["gone"] = 3
+    monkeypatch.setattr(shelf, "read_result", lambda name: content)
+    assert "'gone' = 3, not an option" in shelf.state("circle")
 
 
 def test_what_is_no_number_is_no_result():

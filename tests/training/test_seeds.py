@@ -1,6 +1,7 @@
 """Several training seeds: interquartile means, intervals, the table, the shipped policies, the evaluation of all of them."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +10,11 @@ import pytest
 from scipy import stats
 
 from agents.commands import evaluate as command
-from agents.policy.files import load_policy, save_policy
+from agents.policy.files import FORMAT, WEIGHTS, load_policy, policy_content, save_policy
+from agents.policy.sealed import sealed, unsealed
 from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_figures, shipped_names
 from agents.reports import inspection
+from agents.reports.card import compared
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
 from agents.reports.learning_curves import learning_curves, over_seeds
 from agents.residual.law import observation_names
@@ -88,12 +91,20 @@ def test_a_learning_curve_over_seeds_ends_with_the_shortest():
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", "\xff", '{"law": {}, "curve": []}', '{"law": 3}', '{"law": {}, "curve": [{}], "settings": {}}']
+    "text",
+    [
+        *("", "[]", "{}", '{"law": {}, "curve": []}', '{"law": 3}', '{"law": {}, "curve": [{}], "settings": {}}'),
+        *("\xff" * 9000, '{"a":' * 9000, '{"law": 1' + "0" * 400 + "}"),
+    ],
+    ids=range(9),
 )
 def test_a_damaged_learning_curve_is_named(tmp_path, text):
+    shutil.copy(policy_folders("probe")[0] / WEIGHTS, tmp_path)
     (tmp_path / "training.json").write_bytes(text.encode("latin-1"))
-    with pytest.raises(ValueError, match=r"training\.json' is damaged \(.*\); allowed: a file that birthsim train wrote"):
+    with pytest.raises(ValueError, match=r"training\.json' is damaged.*; allowed: "):
         learning_curves([tmp_path])
+    with pytest.raises(ValueError, match=r"training\.json' is damaged.*; allowed: "):
+        compared(tmp_path)
     assert learning_curves([tmp_path / "nowhere"]) == []
     assert len(learning_curves(policy_folders("circle"))) == 5
 
@@ -108,6 +119,20 @@ def test_of_several_policies_that_do_not_say_what_they_reached_none_is_the_best(
     save_policy(replace(policy, training={}), tmp_path / "seed_1")
     with pytest.raises(ValueError, match=r"seed_1' does not say what it reached in validation; allowed: a folder that"):
         best_policy(tmp_path)
+
+
+@pytest.mark.parametrize("reached", ["abc", "nan", float("nan"), float("inf"), 10**400, -1.0, True, [1], None])
+def test_of_policies_that_reached_no_finite_error_none_is_the_best(tmp_path, reached):
+    policy = load_policy(policy_folders("circle")[0])
+    arrays, about = unsealed(policy_content(policy), FORMAT)
+    for seed in ("seed_0", "seed_1"):
+        (tmp_path / seed).mkdir()
+        own = {**about, "training": {"reached": {"pooled_mm": reached}}}
+        (tmp_path / seed / WEIGHTS).write_bytes(sealed(arrays, own))
+    with pytest.raises(ValueError, match=r"policy = .*allowed: ") as refused:
+        best_policy(tmp_path)
+    assert len(str(refused.value)) < 1000
+    assert best_policy(tmp_path / "seed_1") == tmp_path / "seed_1"
 
 
 @pytest.mark.parametrize("name", shipped_names())

@@ -1,7 +1,6 @@
 """Files that a user wrote: read whole where they are small, refused by name where they are not what they should be."""
 
 import codecs
-import json
 import os
 import tomllib
 from collections.abc import Callable
@@ -79,12 +78,6 @@ def read_toml(name: str, path: str | Path) -> dict[str, Any]:
     text = read_text(name, path)
     tables: dict[str, Any] = _parsed(f"{name} = {named(path)} is no TOML", lambda: tomllib.loads(text), "TOML")
     return tables
-
-
-def read_json(name: str, path: str | Path, most: int = LARGEST) -> Any:
-    """What a JSON file holds; ``ValueError`` names ``name`` and the file."""
-    content = read(name, path, most)
-    return _parsed(f"{name} = {named(path)} is damaged", lambda: json.loads(content), "JSON")
 
 
 def _parsed(said: str, parse: Callable[[], Any], kind: str) -> Any:

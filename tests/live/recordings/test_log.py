@@ -125,8 +125,38 @@ def test_results_that_do_not_fit_together_are_refused(files, tmp_path):
     content = json.loads(files["evaluation"].read_text())
     content["results"][0]["lost"].pop()
     write_json(tmp_path / "short.json", content)
-    with pytest.raises(ValueError, match=r"short.json' is damaged or foreign \(ValueError: episodes of pid are not as many"):
+    with pytest.raises(ValueError, match=r"short.json' is damaged or foreign: episodes of 'pid' are not as many.*allowed: "):
         reading.read_log(tmp_path / "short.json")
+
+
+CHANGES = {
+    "units are numbers": lambda one: one["results"][0].update(units=dict.fromkeys(one["results"][0]["units"], 1)),
+    "a metric has no unit": lambda one: one["results"][0]["units"].popitem(),
+    "a list for results": lambda one: one.update(results=[[1]]),
+    "no results": lambda one: one.update(results=[]),
+    "no episodes": lambda one: one["results"][0].update(seeds=[]),
+    "a seed beyond 64 bits": lambda one: one["results"][0]["seeds"].__setitem__(0, 2**64),
+    "a list for the rig": lambda one: one.update(rig=[1]),
+    "a deep rig": lambda one: one.update(rig=json.loads('{"a":' * 900 + "1" + "}" * 900)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_an_evaluation_of_other_kinds_of_values_is_refused(change, files, tmp_path):
+    content = json.loads(files["evaluation"].read_text())
+    CHANGES[change](content)
+    (tmp_path / "odd.json").write_text(json.dumps(content))
+    with pytest.raises(ValueError, match=r"odd.json' is damaged.*allowed: "):
+        reading.read_log(tmp_path / "odd.json")
+
+
+@pytest.mark.parametrize("shape", [[], [1], [2, 2], [1, 2, 3], [10**300, 2, 2], [0, 2, 2], "x"])
+def test_a_piece_with_another_trace_is_refused(shape, files, tmp_path):
+    content = json.loads(files["piece"].read_text())
+    content["result"]["trace"]["shape"] = shape
+    (tmp_path / "odd.json").write_text(json.dumps(content))
+    with pytest.raises(ValueError, match=r"odd.json' is damaged.*allowed: "):
+        reading.read_log(tmp_path / "odd.json")
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
