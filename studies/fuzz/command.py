@@ -3,7 +3,6 @@
 It exits with 1 where a case failed. A case is its kind, seed and number.
 """
 
-import json
 import sys
 import tempfile
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from tqdm import tqdm
 
 from baselines.commands.settings import MANY, Configured, Seed, whole
 from baselines.work.side_by_side import ONE_THREAD
+from birthsim_env.files import write_json
 from studies.alone import only_under
 from studies.fuzz.harness import Case, Figures, fuzz, generator
 from studies.fuzz.kinds import KINDS
@@ -59,7 +59,7 @@ def main(settings: Settings) -> None:
             name: {"cases": one.tried, "valid": one.valid, "refused": one.refused, "failures": len(one.failures)}
             for name, one in found.items()
         }
-        settings.out.write_text(json.dumps({"seed": settings.seed, "kinds": table}, indent=1), encoding="utf-8")
+        write_json(settings.out, {"seed": settings.seed, "kinds": table})
     if any(figures.failures for figures in found.values()):
         raise SystemExit(1)
 

@@ -240,4 +240,4 @@ def _deed(event: str, arguments: tuple[Any, ...], folder: str, runs_code: bool) 
         return "" if source.startswith(ROOTS) or "lib/python" in source else f"running {source!r}"
     if event not in DEEDS or runs_code:
         return ""
-    return "" if event.startswith("os.") and arguments and _is_ours(arguments[0], folder) else event
+    return "" if event.startswith(("os.", "shutil.")) and arguments and _is_ours(arguments[0], folder) else event

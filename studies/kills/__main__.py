@@ -29,6 +29,9 @@ def main() -> None:
     hear_signals()
     scenarios, outcomes = arguments.scenario or tuple(SCENARIOS), []
     for name in arguments.target or names:
+        if missing := TARGETS[name].missing():
+            print(f"{name}: left out, since {' and '.join(missing)} is not installed", flush=True)
+            continue
         rng = np.random.default_rng([arguments.seed, names.index(name)])
         work = Path(tempfile.mkdtemp(prefix=f"kills-{name}-"))
         try:

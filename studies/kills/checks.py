@@ -8,9 +8,12 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+from zipfile import ZipFile
 
+import numpy as np
 from PIL import Image
 
+from birthsim_env.partials import HIDDEN
 from studies.kills.processes import Running
 from studies.kills.targets import Target
 
@@ -67,6 +70,29 @@ def _parquet(path: Path) -> None:
     parquet.read_table(path)
 
 
+def _mcap(path: Path) -> None:
+    from mcap.reader import make_reader
+
+    with path.open("rb") as file:
+        for _ in make_reader(file).iter_messages():
+            continue
+
+
+def _zip(path: Path) -> None:
+    with ZipFile(path) as archive:
+        if (damaged := archive.testzip()) is not None:
+            raise ValueError(f"{damaged} is damaged")
+
+
+def _dataset(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path) as content:
+        for episode in content.values():
+            for array in ("observations", "actions", "rewards"):
+                np.asarray(episode[array])
+
+
 def _text(path: Path) -> None:
     if not path.read_text(encoding="utf-8").endswith("\n"):
         raise ValueError("the last line has no end")
@@ -74,7 +100,8 @@ def _text(path: Path) -> None:
 
 READERS: dict[str, Callable[[Path], Any]] = {
     ".json": _json, ".journal": _journal, ".png": _picture, ".webp": _picture, ".gif": _picture, ".svg": _svg,
-    ".safetensors": _safetensors, ".onnx": _onnx, ".parquet": _parquet, ".md": _text, ".csv": _text,
+    ".safetensors": _safetensors, ".onnx": _onnx, ".parquet": _parquet, ".mcap": _mcap,
+    ".fmu": _zip, ".hdf5": _dataset, ".md": _text, ".csv": _text,
 }  # fmt: skip
 
 
@@ -86,7 +113,7 @@ def files_in(folder: Path) -> list[Path]:
 def is_leftover(path: Path, folder: Path) -> bool:
     """Whether a file is one that only a running command needs."""
     parts = path.relative_to(folder).parts
-    return any(part.endswith((".partial", ".tmp")) for part in parts) or path.is_symlink()
+    return any(part == HIDDEN or part.endswith(".tmp") for part in parts) or path.is_symlink()
 
 
 def leftovers(folder: Path) -> list[str]:

@@ -40,7 +40,8 @@ class Running:
         self._said = work / f"{label}.stdout", work / f"{label}.stderr"
         self.temporary = work / f"{label}.tmp"
         self.temporary.mkdir(exist_ok=True)
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(self.temporary)}
+        path = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path), "TMPDIR": str(self.temporary)}
         line = [sys.executable, "-c", program(command), *words]
         with self._said[0].open("wb") as out, self._said[1].open("wb") as complaints:
             self.process = subprocess.Popen(

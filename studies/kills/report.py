@@ -1,6 +1,5 @@
 """Outcomes as JSON, as lines on the screen and as a table."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import date
@@ -8,10 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from birthsim_env.files import write_json, write_text
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Listed
 from studies.kills.tries import SCENARIOS, Outcome
 from studies.results import commit
 
 COLUMNS = ("times", "tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
+
+_OUTCOME = {
+    **dict.fromkeys(("target", "scenario", "moment", "commit", "date"), str),
+    **dict.fromkeys(("count", "seed", "tracebacks"), int),
+    **dict.fromkeys(("broken", "leftovers", "talk", "trouble"), Listed(str)),
+    **dict.fromkeys(("equal", "mixed", "alive"), bool),
+    "seconds": float,
+}
 
 INTRODUCTION = Path(__file__).with_name("introduction.md")
 
@@ -40,7 +49,7 @@ def write_outcomes(path: Path, outcomes: Sequence[Outcome], seed: int) -> list[d
 
 def read_outcomes(path: Path) -> list[dict[str, Any]]:
     """The outcomes in a file."""
-    found: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["outcomes"]
+    found: list[dict[str, Any]] = read_json("--out", path, {"outcomes": Listed(_OUTCOME)})["outcomes"]
     return found
 
 

@@ -2,6 +2,7 @@
 
 import tomllib
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -17,7 +18,8 @@ class Target:
     ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` has
     patterns of files, and ``costs`` keys of JSON files in subfolders, that differ from run to run. With ``alone`` one process
     has the folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is
-    complete.
+    complete. A command that writes ``once`` refuses what is there as
+    a whole already. ``needs`` are modules that come with no extra of the project.
     """
 
     name: str
@@ -30,6 +32,12 @@ class Target:
     costs: tuple[str, ...] = ()
     alone: bool = False
     partway: bool = False
+    once: bool = False
+    needs: tuple[str, ...] = ()
+
+    def missing(self) -> list[str]:
+        """What it needs and this environment lacks."""
+        return [name for name in self.needs if find_spec(name) is None]
 
     def line(self, folder: Path, older: bool = False) -> list[str]:
         """The words after the command's name."""
@@ -69,6 +77,17 @@ TARGETS = {
             differ=("checkpoint.safetensors", "events.*"), costs=("seconds", "environment_fraction", "split"), alone=True,
         ),
         Target("export", "birthsim export", ("--to", "onnx", "circle", "--out", "{out}"), file="policy.onnx"),
+        Target("fmu", "birthsim export", ("--to", "fmu", "--out", "{out}"), file="rig.fmu"),
+        Target("build", "birthsim export", ("--to", "c", "--out", "{out}"), older=("--controller", "pid")),
+        Target("parquet", "birthsim export", ("--to", "parquet", "leaderboard/pid.json", "--out", "{out}"), file="log.parquet"),
+        Target("mcap", "birthsim export", ("--to", "mcap", "leaderboard/pid.json", "--out", "{out}"), file="log.mcap"),
+        Target(
+            "minari", "birthsim export",
+            ("--to", "minari", "--env", "BirthSIM/Probe-v2", "--level", "random", "--episodes", "12", "--out", "{out}"),
+            needs=("minari", "h5py"), once=True,
+        ),
+        Target("explain", "birthsim explain", ("--no-pushes", "--out", "{out}"), older=("--policy", "descent")),
+        Target("run", "birthsim run", ("--out", "{out}"), older=("--seed", "7")),
         Target("figure4", "birthsim figure4", ("--out", "{out}"), older=("--controller", "pid")),
         Target(
             "sweep", "birthsim study sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),

@@ -1,5 +1,6 @@
 """One try: a command is killed at random moments, meets a full disk or another process, and is then run again to its end."""
 
+import os
 import shutil
 import signal
 import subprocess
@@ -8,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -160,10 +162,11 @@ class Course:
             return None
         second = self._begin(folder, place, "second")
         outcome = Outcome(self.target.name, scenario, f"{lag:.2f} s apart")
+        statuses = first.wait() + second.wait()
         for running in (first, second):
-            refusal = 2 if self.target.alone and first.wait() + second.wait() == 2 else 0
+            refusal = 2 if self.target.alone and statuses == 2 else 0
             in_use = "in use by another process" in running.stderr()
-            self._end(outcome, running, (refusal if in_use else 0,))
+            self._end(outcome, running, (refusal if in_use else self._status(running),))
             outcome.leftovers += checks.remains(running)
         return self._compare(outcome, folder, before)
 
@@ -178,10 +181,16 @@ class Course:
     def _again(self, outcome: Outcome, folder: Path, before: Results, place: Path) -> Outcome:
         """The same command once more, undisturbed, and what has come of it."""
         running = self._begin(folder, place, "again")
-        self._end(outcome, running, (0,))
+        running.wait()
+        self._end(outcome, running, (self._status(running),))
         self._durations.append(time.monotonic() - running.begun)
         outcome.leftovers += checks.remains(running)
         return self._compare(outcome, folder, before)
+
+    def _status(self, running: Running) -> int:
+        """The status of a command that nothing disturbs."""
+        there = any(words in running.stderr() for words in (" already; allowed: ", "File exists"))
+        return 2 if self.target.once and there else 0
 
     def _compare(self, outcome: Outcome, folder: Path, before: Results) -> Outcome:
         """Results are those of the undisturbed run; pieces of an earlier one, with other arguments, stay beside them."""
@@ -251,7 +260,8 @@ class _Looks:
     def changed(self) -> bool:
         """Whether it has since the last look."""
         seen = []
-        for path in sorted(self._folder.rglob("*")):
+        # Unlike ``rglob`` it goes on where a folder is gone before it is read.
+        for path in sorted(Path(where, name) for where, *inside in os.walk(self._folder) for name in chain(*inside)):
             try:
                 status = path.lstat()
             except FileNotFoundError:

@@ -27,12 +27,13 @@ def test_a_killed_export_goes_on(tmp_path):
 
 
 def test_files_that_are_torn_are_seen_and_hidden_ones_are_leftovers(tmp_path):
-    files = {"whole.json": "{}", "trials.journal": '{"a": 1}\n{"a"', ".whole.json.host-1.partial": "{"}
+    files = {"whole.json": "{}", "trials.journal": '{"a": 1}\n{"a"', ".birthsim/0-1/whole.json": "{"}
     torn = {"torn.json": '{"a": 1', "torn.md": "| a |", "torn.png": "PNG", "torn.svg": "<svg><g>"}
     for name, text in (files | torn).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     assert [line.partition(":")[0] for line in checks.broken(tmp_path)] == list(torn)
-    assert checks.leftovers(tmp_path) == [".whole.json.host-1.partial"]
+    assert checks.leftovers(tmp_path) == [".birthsim/0-1/whole.json"]
 
 
 def test_results_are_equal_but_for_what_may_differ(tmp_path):

@@ -1,11 +1,13 @@
 """The reader of JSON: what is no JSON, too deep, too large, said twice or of another kind is refused in one short line."""
 
 import json
+import re
 
 import pytest
 
 from birthsim_env.physics.rig.json_reading import DEEPEST, DIGITS, parse_json, read_json
 from birthsim_env.physics.rig.schema import Each, Listed, fault
+from tests.console import ROOT
 
 DAMAGED = {
     "nothing": b"", "half": b'{"a": [1', "more": b"{} {}", "no text": b'{"a": "\xff"}' + b"\xff" * 90_000,
@@ -83,3 +85,17 @@ def test_what_does_not_fit_is_named_with_its_place_and_what_is_allowed(change, p
 def test_what_lacks_a_part_and_what_is_no_object_is_named():
     assert fault({}, SCHEMA) == "content lacks 'word'; allowed: an object with word, count, flag, size, each, any"
     assert fault([1], SCHEMA).startswith("content = [1]; allowed: an object with word")
+
+
+OWN = {
+    "birthsim_build/code/emit.py": "its parent's words", "agents/training/checkpoint.py": "what it has just written",
+    "birthsim_env/physics/compiled/sources.py": "under a SHA-256",
+}  # fmt: skip
+"""Files that parse JSON which the package itself has just written, and why nobody else can have."""
+
+
+def test_nothing_else_in_the_packages_parses_json():
+    packages = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live")
+    files = [path for package in packages for path in (ROOT / package).rglob("*.py")]
+    found = {path.relative_to(ROOT).as_posix() for path in files if re.search(r"\bjson\.loads?\(", path.read_text("utf-8"))}
+    assert found == {*OWN, "birthsim_env/physics/rig/json_reading.py"}
