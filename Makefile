@@ -12,7 +12,7 @@
 # make scratch trains PPO from scratch
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
-# make prose reads the documentation for words that the glossary replaces and for long sentences, and counts its words; it needs npm
+# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm
 # make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -155,7 +155,6 @@ lint: $(READY)
 # CHANGELOG.md tells of the past.
 prose: $(NPM)/.ready
 	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md CODE_OF_CONDUCT.md paper.md docs
-	python3 docs/_prose/words.py
 
 # What comes from npm: the reader of the prose, and axe-core, with which tests look at pages.
 $(NPM)/.ready: requirements/npm/package.json requirements/npm/package-lock.json
