@@ -1,6 +1,7 @@
 """What every controller looks like."""
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
@@ -8,8 +9,11 @@ import numpy as np
 
 from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.parts.callables import arguments_of
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
+from birthsim_env.physics.rig.arrays import floats_of
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import is_finite, is_within, limits, problem, shown
 
 BEYOND = 1000.0
 """A gain may be so many times below the lowest, or above the highest, that tuning tries."""
@@ -32,6 +36,12 @@ Law = Callable[[Measurement, Reference], Array]
 """A function as a control law: openings as ``Controller.command`` returns them."""
 
 
+ALLOWED = (
+    "an object with command(measurement, reference) and reset(), a function law(measurement, reference), or a class or "
+    "function that makes one of the rig (birthsim_env.Parameters)"
+)
+
+
 class PlainLaw:
     """A user's function of measurement and reference as a controller, which remembers nothing."""
 
@@ -42,31 +52,75 @@ class PlainLaw:
         """There is nothing to forget."""
 
 
+class WholeReset:
+    """A user's controller whose ``reset()`` knows no lanes: it is called where all of them begin."""
+
+    def __init__(self, controller: Any) -> None:
+        self.controller, self.command = controller, controller.command
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes; some lanes cannot be forgotten alone."""
+        if lanes is None:
+            self.controller.reset()
+
+
+def _is_controller(part: Any) -> bool:
+    return not inspect.isclass(part) and callable(getattr(part, "command", None)) and callable(getattr(part, "reset", None))
+
+
+def is_ready(part: Any) -> bool:
+    """Whether a user's part is a controller or a law, rather than what makes one of a rig.
+
+    A law needs both signals. A function that needs one argument makes a controller, whatever else it takes."""
+    if _is_controller(part):
+        return True
+    if inspect.isclass(part) or not callable(part):
+        return False
+    takes = arguments_of(part)
+    return takes.take(2) and (takes.needed != 1 or takes.most == math.inf or takes.names[:2] == ("measurement", "reference"))
+
+
 def controller_of(part: Any) -> Controller:
-    """A controller as it is, or a function of measurement and reference as one; ``ValueError`` for anything else."""
+    """A user's controller as it is, or a function of measurement and reference as one; ``ValueError`` for anything else."""
     if inspect.isclass(part):
         raise ValueError(f"controller = {part.__name__}, a class; allowed: an object of it, {part.__name__}(...)")
-    if callable(getattr(part, "command", None)) and callable(getattr(part, "reset", None)):
-        made: Controller = part
+    if _is_controller(part):
+        made: Controller = part if arguments_of(part.reset).take(1) else WholeReset(part)
         return made
-    if callable(part):
+    if callable(part) and arguments_of(part).take(2):
         return PlainLaw(part)
-    raise ValueError(
-        f"controller = {shown(part)}; allowed: an object with command(measurement, reference) and reset(), such as "
-        "make_controller(name, parameters) returns, or a function of measurement and reference"
-    )
+    raise ValueError(f"controller = {shown(part)}; allowed: {ALLOWED}, which is called first")
+
+
+def made_controller(name: str, part: Any, rig: Parameters, options: Mapping[str, Any]) -> Controller:
+    """The controller that a user's ``part`` is, or makes of the ``rig`` and ``options``; ``name`` is for errors.
+
+    Raises ``ValueError`` in one line."""
+    if is_ready(part):
+        return controller_of(part)
+    if not callable(part):
+        raise ValueError(f"controller = {shown(name)} is {shown(part)}; allowed: {ALLOWED}")
+    try:
+        made = part(rig, **options) if arguments_of(part).most else part(**options)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # it may also end Python
+        raise ValueError(f"controller = {shown(name)} cannot be made ({problem(error)}); allowed: {ALLOWED}") from error
+    if not is_ready(made):
+        said = "without command() or reset()" if inspect.isclass(part) else f"as {shown(made)}"
+        raise ValueError(f"controller = {shown(name)} is made {said}; allowed: {ALLOWED}")
+    return controller_of(made)
 
 
 def checked_command(name: str, command: Any, lanes: int) -> Array:
     """Spool openings (4, ``lanes``) that the controller ``name`` returned; ``ValueError`` in one line for anything else."""
     expected = f"allowed: spool openings of chambers P1, N1, P2, N2 of {lanes} lanes, an array (4, {lanes}) in [-1, 1]"
     try:
-        array = np.asarray(command, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"controller {name!r}: command() returned {command!r}; {expected}") from None
+        array = floats_of(command)
+    except ValueError as error:
+        raise ValueError(f"controller {name!r}: command() returned {shown(command)}: {error}; {expected}") from None
     if array.shape != (4, lanes):
-        returned = "None" if command is None else f"an array {array.shape}"
-        raise ValueError(f"controller {name!r}: command() returned {returned}; {expected}")
+        raise ValueError(f"controller {name!r}: command() returned an array {array.shape}; {expected}")
     if not np.abs(array).max() <= 1.0:
         row, lane = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0))[0])
         raise ValueError(f"controller {name!r}: command()[{row}, {lane}] = {array[row, lane]}; {expected}")
@@ -79,9 +133,9 @@ class Tunable(Protocol):
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
 
 
-def check_gains(controller: Tunable, gains: Mapping[str, float]) -> None:
-    """Raises ``ValueError`` for gains that the controller has not, and for those that are not positive (or zero where the
-    lowest to try is)."""
+def checked_gains(controller: Tunable, gains: Mapping[str, float]) -> dict[str, float]:
+    """``gains`` as floats; raises ``ValueError`` for gains that the controller has not, and for those that are not positive
+    (or zero where the lowest to try is)."""
     known = controller.TUNABLE
     for name, value in gains.items():
         if name not in known:
@@ -95,6 +149,7 @@ def check_gains(controller: Tunable, gains: Mapping[str, float]) -> None:
                 else f"a positive number{limits(least=least, most=most)}"
             )
             raise ValueError(f"{name} = {shown(value)}; allowed: {words}")
+    return {name: float(value) for name, value in gains.items()}
 
 
 def check_flags(flags: Mapping[str, object]) -> None:

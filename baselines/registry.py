@@ -4,8 +4,8 @@ A factory takes the rig as its owner describes it, and keyword options, and retu
 """
 
 import inspect
+import os
 from collections.abc import Callable
-from functools import partial
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -13,14 +13,14 @@ from baselines.about import RESIDUAL
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import Controller, PlainLaw, check_flags
+from baselines.controller import Controller, check_flags, is_ready, made_controller
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.staged import StagedController
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.values import near, problem, shown
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import near, shown
 
 Factory = Callable[..., Controller]
 
@@ -120,25 +120,30 @@ def _factory(name: str) -> Factory:
                 raise ValueError(f"{error}{needs}") from error
             return factory
     if plain.rpartition(":")[0].endswith(".py"):
-        return partial(_own, plain, from_file("controller", plain))
+        return _Own(plain, from_file("controller", plain))
     names = controller_names()
     asked = near(plain, names)
     allowed = "a registered name" if asked else ", ".join(names)
     raise ValueError(f"controller = {shown(split_options(name)[0])}{asked}; allowed: {allowed}, or path/to/file.py:Class")
 
 
-def _is_law(part: Any) -> bool:
-    """Whether what a file names is a function of the two signals, rather than what makes a controller of a rig."""
-    return inspect.isfunction(part) and list(inspect.signature(part).parameters) == ["measurement", "reference"]
+class _Own:
+    """Makes the controller of a user's ``part``."""
+
+    def __init__(self, name: str, part: Any) -> None:
+        self.name, self.part = name, part
+
+    def __call__(self, parameters: Parameters, **options: Any) -> Controller:
+        return made_controller(self.name, self.part, parameters, options)
 
 
 def known_options(name: str) -> list[str] | None:
     """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
     factory: Any = _factory(name)
-    kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
-    if _is_law(kind):
+    kind = factory.part if isinstance(factory, _Own) else getattr(factory, "func", factory)
+    if is_ready(kind) or not callable(kind):
         return []
-    parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
+    parameters = list(inspect.signature(kind).parameters.values())
     named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(kind, "TUNABLE", {})
     guarded = GUARDING if inspect.isclass(kind) and issubclass(kind, StagedController) else ()
     if kind is _backstepping:
@@ -148,47 +153,32 @@ def known_options(name: str) -> list[str] | None:
     return [*named, *tunable, *guarded] if closed else None
 
 
-def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
-    """The controller ``name``, or the class of a user's own file given as ``path/to/file.py:Class``.
+def make_controller(name: str | os.PathLike[str], parameters: Parameters | None = None, **options: Any) -> Controller:
+    """The controller ``name``, or what a user's own file has, given as ``path/to/file.py:Name``.
 
     A name may be short (``SHORT_NAMES``) and carry options, ``pid[bandwidth=60]``, or a policy, ``residual:circle``.
-    ``limited:`` before it puts the law behind the limits of ``PortLimiter``.
-    Raises ``ValueError`` naming what is unknown and what there is.
+    ``limited:`` before it puts the law behind the limits of ``PortLimiter``. ``parameters`` are what environments take too.
+    ``options`` are those of the controller, as its name carries them. Raises ``ValueError`` naming what is unknown and what
+    there is.
     """
+    if not isinstance(name, (str, os.PathLike)):
+        raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(controller_names())}, or path/to/file.py:Name")
+    name, rig = os.fspath(name), load_parameters(parameters)
     plain, named = resolved(name)
     known = known_options(name)
-    for option, value in named.items():
+    for option, value in {**named, **options}.items():
         if known is not None and option not in known:
             allowed = ", ".join(known) or "no options"
             raise ValueError(
-                f"controller = {shown(name)}: {option} = {shown(value)} is unknown; allowed for {plain}: {allowed}"
+                f"controller = {shown(name)}: {option} = {shown(value)} is unknown{near(option, known)}; allowed for {plain}: "
+                f"{allowed}"
             )
     given = {**named, **options}
     guarding = {option: given.pop(option) for option in GUARDING if option in given}
-    law = _factory(name)(parameters, **given)
-    whole = PortLimiter(law, parameters) if name.startswith(LIMITED) else law
+    law = _factory(name)(rig, **given)
+    whole = PortLimiter(law, rig) if name.startswith(LIMITED) else law
     if not guarding:
         return whole
     if not isinstance(whole, StagedController):
         raise ValueError(f"{', '.join(guarding)} for controller = {shown(name)}; allowed: for a controller of the package")
     return whole.protect(**guarding)
-
-
-def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Controller:
-    """A controller of a user's own class; raises ``ValueError`` naming what it lacks, in one line."""
-    expected = (
-        "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset(), or a "
-        "function law(measurement, reference)"
-    )
-    if _is_law(factory):
-        return PlainLaw(factory)
-    try:
-        own = factory(parameters, **options)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # it may also end Python
-        raise ValueError(f"controller = {shown(name)} cannot be made ({problem(error)}); {expected}") from error
-    if not (callable(getattr(own, "command", None)) and callable(getattr(own, "reset", None))):
-        raise ValueError(f"controller = {shown(name)} is made without command() or reset(); {expected}")
-    made: Controller = own
-    return made

@@ -33,7 +33,8 @@ from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.values import is_within, near, shown
+from birthsim_env.physics.rig.values import is_within, near, problem, shown
+from birthsim_env.restored import ANY, Declared
 
 NO_ACTION = np.zeros(0, dtype=np.float32)
 """What a single environment's ``step`` takes where a controller drives it."""
@@ -110,6 +111,9 @@ class StagedController:
 
     COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = COMMAND_OPTIONS
     """What ``command`` takes besides the signals."""
+
+    in_state: ClassVar[Declared] = {"_kept": ANY}
+    """NaN stands for what has not been measured yet."""
 
     asks: ClassVar[bool] = False
     """Whether the stages themselves say what the law is asked for, and the forces that it is to believe in."""
@@ -303,6 +307,7 @@ class Driving(Forgetful):
 
     size, every_period = 0, True
     names: tuple[str, ...] = ()
+    in_state: ClassVar[Declared] = {"spent": None}
 
     def __init__(self, controller: Controller, name: str | None, options: dict[str, Array]) -> None:
         self.controller, self._name, self._options, self.spent = controller, name, options, list[float]()
@@ -315,7 +320,16 @@ class Driving(Forgetful):
 
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         started = time.perf_counter()
-        command = self.controller.command(measurement, reference, **self._options)
+        try:
+            command = self.controller.command(measurement, reference, **self._options)
+        except (ValueError, MemoryError):
+            raise
+        except Exception as error:
+            if self._name is None:
+                raise
+            raise ValueError(
+                f"controller {self._name!r}: command() fails ({problem(error)}); allowed: openings (4, lanes)"
+            ) from error
         self.spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
         return command if self._name is None else checked_command(self._name, command, plant.num_envs)
 

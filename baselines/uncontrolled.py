@@ -1,11 +1,14 @@
 """What any controller should beat: shut valves, slammed valves, random openings. They look at nothing."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_count
+from birthsim_env.restored import Declared, Kept
 
 HELD = 0.01
 """s that a random opening is held: the default policy period."""
@@ -37,7 +40,10 @@ class SlammedValves(ShutValves):
 class RandomValves:
     """Uniform openings, drawn anew every ``HELD`` s from a generator that begins with ``seed``."""
 
+    in_state: ClassVar[Declared] = {"_count": Kept(0, 2**62, whole=True), "_openings": Kept(-1.0, 1.0)}
+
     def __init__(self, parameters: Parameters, seed: int = 0) -> None:
+        self._openings: Array | None = None
         self._periods = max(1, round(HELD / parameters.electronics.control_period))
         self._seed = checked_count("seed", seed, 0, 2**63)
         self.reset()
@@ -47,6 +53,7 @@ class RandomValves:
         if self._count % self._periods == 0:
             self._openings = self._rng.uniform(-1.0, 1.0, (4, *measurement.time.shape))
         self._count += 1
+        assert self._openings is not None, "drawn in the first period"
         return self._openings
 
     def reset(self, lanes: Mask | None = None) -> None:

@@ -96,5 +96,23 @@ def packed_image(rows: Array, parts: Sequence[Words]) -> Words:
     return np.concatenate([head, rows.view(np.int64), *parts])
 
 
+def changing_words(image: Words) -> list[tuple[int, int]]:
+    """Where the words of an image are that running it changes, (first, beyond the last), in order: rows, the memory and tables
+    of stages, and the addresses of tables, which are written anew before they are used. All others say what the loop is."""
+    found, place = [(HEAD, HEAD + ROWS)], HEAD + ROWS
+    for _ in range(image[2]):
+        part = image[place:]
+        words, stages, tables = (int(word) for word in part[:3])
+        entries = part[PART_HEAD : PART_HEAD + ENTRY * stages].reshape(-1, ENTRY)
+        addresses = part[PART_HEAD + ENTRY * stages :][: 2 * tables].reshape(-1, 2)
+        found += [(place + memory, place + constants) for _, memory, constants, _ in entries.tolist() if memory != OF_INPUTS]
+        ends = sorted([*addresses.ravel().tolist(), *entries[:, 3].tolist()])
+        for described, table in addresses.tolist():
+            beyond = next(end for end in ends if end > table)
+            found += [(place + described, place + described + 1), (place + table, place + beyond)]
+        place += words
+    return sorted((first, last) for first, last in found if first < last)
+
+
 INPUT_MEMORY: Array = np.zeros((0, 1))
 """Stands for the inputs as the memory of a stage."""

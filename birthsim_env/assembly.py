@@ -21,8 +21,9 @@ from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.parts.times import called, check_times
+from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.values import is_within, near, shown
+from birthsim_env.physics.rig.values import is_within, near, shown, whole_of
 from birthsim_env.simulation import Simulation
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -89,6 +90,7 @@ ROUNDING = 2.0**-20
 
 def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
     """``value`` if it is allowed, else a ``ValueError`` that lists what is."""
+    value = bool(value) if isinstance(value, np.bool_) else value
     if not any(value is option or (isinstance(value, str) and value == option) for option in allowed):
         like = near(value, [option for option in allowed if isinstance(option, str)]) if isinstance(value, str) else ""
         raise ValueError(f"{name} = {shown(value)}{like}; allowed: {', '.join(repr(option) for option in allowed)}")
@@ -99,7 +101,8 @@ def policy_periods(policy_period: float, parameters: Parameters) -> int:
     """Control periods in a policy period, which must be a whole number of them."""
     control = parameters.electronics.control_period
     periods = round(policy_period / control) if is_within(policy_period, above=0.0, most=LONGEST_PERIOD) else 0
-    if periods < 1 or abs(periods * control - policy_period) > 1e-9:
+    # Within 1e-9 s, or as near as a number of single precision is.
+    if periods < 1 or abs(periods * control - policy_period) > max(1e-9, 1e-7 * policy_period):
         raise ValueError(
             f"policy_period = {shown(policy_period)} s; allowed: a multiple of the control period {control:g} s up to "
             f"{LONGEST_PERIOD:g} s"
@@ -187,9 +190,10 @@ def threads_for(num_envs: int, num_threads: int | None) -> int:
     """``num_threads`` if that is a whole number of at least 1; for None, one for one lane and else all that there are."""
     if num_threads is None:
         return available_threads() if num_envs > 1 else 1
-    if isinstance(num_threads, bool) or not isinstance(num_threads, (int, np.integer)) or not 1 <= num_threads <= MOST_THREADS:
+    threads = whole_of(num_threads)
+    if threads is None or not 1 <= threads <= MOST_THREADS:
         raise ValueError(f"num_threads = {shown(num_threads)}; allowed: None or a whole number >= 1 and <= {MOST_THREADS}")
-    return int(num_threads)
+    return threads
 
 
 def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Sequence[str] = ()) -> None:
@@ -210,9 +214,9 @@ def checked_actions(actions: Any, num_envs: int, size: int, clip: bool, arrays: 
     that are wanted.
     """
     try:
-        array = arrays.asarray(actions, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
-        raise ValueError(f"action = {shown(actions)}; allowed: {size} numbers in [-1, 1]") from error
+        array = floats_of(actions, arrays)
+    except ValueError as error:
+        raise ValueError(f"action = {shown(actions)}: {error}; allowed: {size} numbers in [-1, 1]") from error
     if array.shape != (num_envs, size):
         shape = (size,) if num_envs == 1 else (num_envs, size)
         given = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape

@@ -1,6 +1,5 @@
 """The single environment: one lane of the simulation."""
 
-from dataclasses import replace
 from typing import Any, Unpack
 
 import gymnasium
@@ -11,11 +10,11 @@ from numpy.typing import NDArray
 from birthsim_env.assembly import RENDER_MODES, Arguments, assemble, one_of, spelled_out
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
-from birthsim_env.face import Face
+from birthsim_env.face import Face, measurement_of
 from birthsim_env.info import single_info
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.rig.values import whole_of
 from birthsim_env.reward import REWARD_TERMS
-from birthsim_env.state import State
 
 _ONE = np.ones(1, dtype=np.bool_)
 
@@ -145,8 +144,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now: the input of a controller. Arrays without a lane axis."""
-        seen = self.simulation.measurement
-        return replace(seen, **{name: rows.T[0] for name, rows in vars(seen).items() if isinstance(rows, np.ndarray)})
+        return measurement_of(self.simulation.measurement, 0)
 
     @property
     def reference(self) -> Reference:
@@ -154,19 +152,16 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         return Reference(self.simulation.reference.rows[:, 0])
 
     @property
-    def duration(self) -> float:
-        """How long an episode is that nothing ends early, s."""
-        return self._episodes.duration
-
-    @property
     def scene(self) -> Scene:
         """What a frame shows now, in any render mode; see ``birthsim_env.drawing.scene.Scene``."""
-        return self._episodes.scene(0)
+        return self.scene_of(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; a seed makes this and all following episodes repeatable."""
+        whole = whole_of(seed)
+        seed = seed if whole is None else whole
         super().reset(seed=seed)
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(_ONE, options)
@@ -186,16 +181,6 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         info["is_success"] = bool(episodes.success[0])
         self._render_human()
         return episodes.observation()[0], float(paid[-1, 0]), terminated, truncated, info
-
-    def get_state(self) -> State:
-        """All that the future depends on, as arrays by name: see ``BirthSIMVectorEnv.get_state``."""
-        return self._episodes.get_state(self.np_random)
-
-    def set_state(self, state: State) -> None:
-        """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
-        if not self._episodes.begun:
-            self.reset(seed=0)
-        self._episodes.set_state(state, self.np_random)
 
     def render(self) -> Any:
         """A frame (height, width, 3), uint8, in mode ``rgb_array``."""

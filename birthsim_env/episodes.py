@@ -1,6 +1,6 @@
 """What the single and the vector environment share: episodes of lanes, their seeds, rewards, observations and frames."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,9 @@ from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.drawn.seeding import lane_seeds
 from birthsim_env.physics.compiled.lanes import PRESSURES, Y1, Y2, Array
+from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.values import shown
+from birthsim_env.restored import Declared, Kept
 from birthsim_env.state import State, give_state, take_state
 
 if TYPE_CHECKING:
@@ -21,12 +23,17 @@ if TYPE_CHECKING:
 WINDOW_FRAMES_PER_SECOND = 50
 PATH_POINTS = 160
 
+COUNTED = Kept(least=0, most=2**62, whole=True)
+"""Steps and episodes."""
+
 
 class Episodes:
     """The lanes of a ``Setup`` with their clocks and seeds; ``elapsed`` (N,) counts policy steps since an episode began."""
 
     arrays: Any = np
     """The module of the arrays of lanes."""
+
+    in_state: ClassVar[Declared] = {"elapsed": COUNTED, "_numbers": COUNTED, "_seeds": Kept(least=0, whole=True)}
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -76,6 +83,10 @@ class Episodes:
         give_state(self._parts(random, ended), state)
         self.simulation.forget_loops()
         self._path = None
+
+    def end(self) -> None:
+        """As if no episode had begun."""
+        self._seeds = []
 
     def _parts(self, random: np.random.Generator, ended: NDArray[np.bool_] | None) -> dict[str, Any]:
         return {"episodes": self, "random": random, **({} if ended is None else {"ended": ended})}
@@ -227,8 +238,8 @@ def start_of(options: dict[str, Any] | None) -> Array | None:
     if not options:
         return None
     try:
-        position = np.asarray(options["position"], dtype=np.float64)
-    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
+        position = floats_of(options["position"])
+    except ValueError:
         position = np.empty(0)
     if position.shape != (2,) or not np.isfinite(position).all():
         raise ValueError(f"options['position'] = {shown(options['position'])}; allowed: (x, y), finite, in m")

@@ -1,16 +1,29 @@
 """What the single and the vector environment say of themselves alike."""
 
 import copy
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from gymnasium.envs.registration import EnvSpec
+from numpy.typing import NDArray
 
 from birthsim_env.assembly import RENDER_MODES
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.state import State
 
 if TYPE_CHECKING:
     from birthsim_env.gradients import Recorder
+
+
+def measurement_of(measurement: Measurement, lane: int) -> Measurement:
+    """What the sensors of one lane say, in arrays without a lane axis."""
+    own = {name: rows.T[lane] for name, rows in vars(measurement).items() if isinstance(rows, np.ndarray)}
+    return replace(measurement, **own)
 
 
 class Face:
@@ -21,6 +34,15 @@ class Face:
     """Policy steps of an episode that nothing ends early."""
 
     _episodes: Episodes
+    _ended: NDArray[np.bool_]
+    """Of several lanes: which have ended, (N,)."""
+
+    _np_random: np.random.Generator | None
+    _np_random_seed: int | None
+    np_random: np.random.Generator
+    reset: Callable[..., Any]
+    """Gymnasium's."""
+
     _spec: EnvSpec | None = None
 
     def _show(self, episodes: Episodes, **more: Any) -> None:
@@ -39,6 +61,42 @@ class Face:
     def dt(self) -> float:
         """s of a policy step."""
         return self._episodes.setup.policy_period
+
+    def get_state(self) -> State:
+        """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.
+
+        Another environment with the same arguments takes it with ``set_state`` and goes on with the same bits, in this process
+        or another one. It leaves out what a user's part keeps outside of its attributes. Raises ``RuntimeError`` before the
+        first ``reset``. Raises ``ValueError`` for a user's part with an attribute that is no number, text, array, generator, or
+        list, tuple, dict or object of these.
+        """
+        return self._episodes.get_state(self.np_random, getattr(self, "_ended", None))
+
+    def set_state(self, state: State) -> None:
+        """Go on from what ``get_state`` returned.
+
+        Raises ``ValueError`` for the state of another environment, and for names, shapes, types and numbers that ``get_state``
+        of this one does not return; then nothing has changed.
+        """
+        before = None if self._episodes.begun else (self._np_random, self._np_random_seed)
+        if before is not None:
+            self.reset(seed=0)  # makes room for what parts remember
+        try:
+            self._episodes.set_state(state, self.np_random, getattr(self, "_ended", None))
+        except ValueError:
+            if before is not None:
+                self._np_random, self._np_random_seed = before
+                self._episodes.end()
+            raise
+
+    @property
+    def duration(self) -> float:
+        """How long an episode is that nothing ends early, s."""
+        return self._episodes.duration
+
+    def scene_of(self, lane: int) -> Scene:
+        """What a frame of a lane shows now, in any render mode; see ``birthsim_env.drawing.scene.Scene``."""
+        return self._episodes.scene(lane)
 
     def record(self) -> "Recorder":
         """What keeps every policy step from now on, for gradients (``birthsim_env.gradients``); on a device, there."""

@@ -5,7 +5,7 @@ plant moves, and then reference, hand and sensors are brought to the new instant
 all periods of a policy step are one call; the loop stops only for what a user has written in Python.
 """
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,11 @@ from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import plain
 from birthsim_env.physics.strength import require_carried
+from birthsim_env.restored import Declared, Kept, is_own
 
 if TYPE_CHECKING:
     from birthsim_env.gradients import Pullback
@@ -52,6 +55,8 @@ class Simulation(Instant):
     begin, ``closing`` stages at the end of a policy step. ``watch`` adds stages that look on in every control period.
     ``threads`` share the lanes. Without a ``force_sensor`` the measured force of the hand is zero.
     """
+
+    in_state: ClassVar[Declared] = {"_sample": Kept(0, 2**62, whole=True), "_samples": Kept(grows=True), "threads": None}
 
     def __init__(
         self,
@@ -76,6 +81,8 @@ class Simulation(Instant):
             self.sensors.vary(of_sensors)  # type: ignore[attr-defined]
         self.actuation = actuation
         for part in (trajectory, user_force, stiffness):
+            if is_own(type(part)):
+                vars(part).update({name: plain(value) for name, value in vars(part).items()})
             part.prepare(num_envs)
         self.period = parameters.electronics.control_period
         self.periods, self.threads, self.force_sensor = periods, threads, force_sensor
@@ -272,7 +279,8 @@ class Simulation(Instant):
 
     def _ask(self, period: int) -> None:
         if period == 0 or self.actuation.every_period:
-            self._wanted[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
+            openings = self.actuation.openings(self.plant, self.measurement, self.reference)
+            self._wanted[:] = checked("actuation.openings(...)", openings, (4, self.plant.num_envs), "1")
             if self.actuation.memory_names:
                 self._shown[:] = self.actuation.memory()
         # Anew in every period: the board of the sensors may have put out something else.
@@ -282,10 +290,12 @@ class Simulation(Instant):
         self._openings[:] = self.sensors.put_out(self.ticks, self._openings)  # type: ignore[attr-defined]
 
     def _follow(self, _: int) -> None:
-        self._seen[at.REFERENCE : at.REFERENCE + 8] = self.trajectory.sample(self.time)
+        rows = self.trajectory.sample(self.time)
+        self._seen[at.REFERENCE : at.REFERENCE + 8] = checked("reference.sample(time)", rows, (8, self.plant.num_envs), "SI")
 
     def _set(self, _: int) -> None:
-        self._seen[at.REFERENCE + 8 : at.ASKED] = self.stiffness.sample(self.time)
+        rows = self.stiffness.sample(self.time)
+        self._seen[at.REFERENCE + 8 : at.ASKED] = checked("stiffness.sample(time)", rows, (7, self.plant.num_envs), "N/m")
 
     def _push(self, _: int) -> None:
         self._sample += 1

@@ -16,9 +16,8 @@ from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import MOST_LANES
-from birthsim_env.physics.rig.values import checked_count, shown
+from birthsim_env.physics.rig.values import checked_count, shown, whole_of
 from birthsim_env.reward import REWARD_TERMS
-from birthsim_env.state import State
 
 Observations = NDArray[np.float32]
 
@@ -52,10 +51,9 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         device: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        checked_count("num_envs", num_envs, 1, MOST_LANES)
-        if isinstance(max_episode_steps, int) and max_episode_steps == -1:
-            max_episode_steps = None
-        if max_episode_steps is not None and not (isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1):
+        num_envs = checked_count("num_envs", num_envs, 1, MOST_LANES)
+        most_steps = whole_of(-1 if max_episode_steps is None else max_episode_steps)
+        if most_steps is None or (most_steps < 1 and most_steps != -1):
             given = shown(max_episode_steps)
             raise ValueError(f"max_episode_steps = {given}; allowed: None, -1 (no limit) or a whole number >= 1")
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
@@ -65,19 +63,19 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
         if device is None:
-            episodes = Episodes(assemble(int(num_envs), scenario, **arguments))
+            episodes = Episodes(assemble(num_envs, scenario, **arguments))
         else:
             one_of("render_mode, with a device,", render_mode, (None,))
             on_device = import_module("birthsim_build.device.episodes").DeviceEpisodes
             # Each setup prepares the parts that it is given for its own lanes.
-            episodes = on_device(device, int(num_envs), lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
+            episodes = on_device(device, num_envs, lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
         setup = episodes.setup
         self._show(episodes, autoreset_mode=self.autoreset_mode)
-        self.num_envs = int(num_envs)
+        self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = setup.single_observation_space, setup.single_action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.steps = min(setup.steps, max_episode_steps or setup.steps)
+        self.steps = min(setup.steps, most_steps if most_steps > 0 else setup.steps)
         self._ended: NDArray[np.bool_] = self._episodes.arrays.zeros(self.num_envs, dtype=np.bool_)
 
     @property
@@ -103,7 +101,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         Where ``options["staggered"]`` is true, lane i's first episode is truncated i/N of its steps early. From then on the
         lanes are at different moments of their episodes. A learner that sees all lanes at the same moment forgets the others.
         """
-        super().reset(seed=seed if isinstance(seed, int) else None)
+        super().reset(seed=whole_of(seed))
         options = dict(options or {})
         lanes = self._mask(options.pop("reset_mask", None))
         staggered = options.pop("staggered", False)
@@ -161,22 +159,6 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
                 infos["final_obs"][lane] = last[lane]
             infos["_final_obs"] = infos["_final_info"] = ended
         return observation, rewards, terminated, truncated, infos
-
-    def get_state(self) -> State:
-        """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.
-
-        Another environment with the same arguments takes it with ``set_state`` and goes on with the same bits, in this process
-        or another one. It leaves out what a user's part keeps outside of its attributes. Raises ``RuntimeError`` before the
-        first ``reset``. Raises ``ValueError`` for a user's part with an attribute that is no number, text, array, generator, or
-        list, tuple, dict or object of these.
-        """
-        return self._episodes.get_state(self.np_random, self._ended)
-
-    def set_state(self, state: State) -> None:
-        """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
-        if not self._episodes.begun:
-            self.reset(seed=0)
-        self._episodes.set_state(state, self.np_random, self._ended)
 
     def render(self) -> tuple[Any, ...] | None:
         """A frame of every lane (``rgb_array``), or lane 0 in a window (``human``)."""

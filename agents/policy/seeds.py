@@ -1,5 +1,6 @@
 """Policies of several training seeds: where they are, and what they reach together."""
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, jsonable, penalize_lost, quantile
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.schema import fault
-from birthsim_env.physics.rig.values import near, shown
+from birthsim_env.physics.rig.values import near, path_of, shown
 
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 """Trained policies that come with the package, a folder per configuration and in it one per seed."""
@@ -30,12 +31,17 @@ def shipped_names() -> list[str]:
     return sorted(path.name for path in SHIPPED.iterdir() if path.is_dir()) if SHIPPED.is_dir() else []
 
 
-def policy_folders(path: str | Path) -> list[Path]:
+def policy_folders(path: str | os.PathLike[str]) -> list[Path]:
     """The policy folders at ``path``: itself, or its ``seed_*`` in order; or those of a shipped name.
 
     Raises ``ValueError`` where there is none.
     """
-    folder = SHIPPED / str(path) if str(path) in shipped_names() else Path(str(path))
+    text = path_of(path)
+    if text is None:
+        raise ValueError(
+            f"policy = {shown(path)}; allowed: a folder that birthsim train wrote, or {', '.join(shipped_names())}"
+        )
+    folder = SHIPPED / text if text in shipped_names() else Path(text)
     if (folder / WEIGHTS).is_file():
         return [folder]
     found = sorted(
@@ -44,13 +50,13 @@ def policy_folders(path: str | Path) -> list[Path]:
     )
     if not found:
         raise ValueError(
-            f"policy = {str(path)!r} holds no policy{near(str(path), shipped_names())}; "
+            f"policy = {shown(text)} holds no policy{near(text, shipped_names())}; "
             f"allowed: a folder that birthsim train wrote, or {', '.join(shipped_names())}"
         )
     return found
 
 
-def best_policy(path: str | Path) -> Path:
+def best_policy(path: str | os.PathLike[str]) -> Path:
     """The policy folder at ``path``, of several seeds the one that did best in validation.
 
     Raises as ``policy_folders``, and ``ValueError`` where a policy says no error in mm that it reached, or none of several was

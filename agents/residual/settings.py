@@ -4,7 +4,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from baselines.registry import resolved
-from birthsim_env.physics.rig.values import is_within, shown
+from birthsim_env.assembly import one_of
+from birthsim_env.physics.rig.values import is_within, make_plain, shown
 
 NO_LAW = "none"
 
@@ -61,6 +62,7 @@ class ResidualSettings:
             value = getattr(self, name)
             if not is_within(value, above=low, most=high):
                 raise ValueError(f"{name} = {shown(value)}; allowed: more than {low:g}, at most {high:g}")
+        make_plain(self)
         for name, allowed in (("law", LAWS), ("impedance", tuple(IMPEDANCES))):
             value = getattr(self, name)
             if not isinstance(value, str) or not is_one_of(value, allowed):
@@ -68,8 +70,7 @@ class ResidualSettings:
         if self.impedance != "fixed" and (self.law.startswith("admittance") or self.law == NO_LAW):
             raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
         for name in ("force_sensor", "informed"):
-            if not isinstance(getattr(self, name), bool):
-                raise ValueError(f"{name} = {shown(getattr(self, name))}; allowed: True, False")
+            object.__setattr__(self, name, one_of(name, getattr(self, name), (True, False)))
         if not self.force_sensor and (self.impedance != "fixed" or is_one_of(self.law, FORCE_LAWS)):
             raise ValueError(
                 f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' "

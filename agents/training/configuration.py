@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,7 +12,7 @@ from birthsim_env.assembly import one_of
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.reading import read_toml
-from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, near, shown
+from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, make_plain, near, path_of, shown, whole_of
 
 STABLE_BASELINES = ("ppo", "sac", "tqc")
 ALGORITHMS = (*STABLE_BASELINES, "apg")
@@ -85,17 +86,18 @@ class TrainingSettings:
         if not isinstance(self.environment, str):
             raise ValueError(f"environment = {shown(self.environment)}; allowed: the id of a residual environment")
         for name, (few, many) in COUNTS.items():
-            checked_count(name, getattr(self, name), few, many)
+            object.__setattr__(self, name, checked_count(name, getattr(self, name), few, many))
         for name, unit, low, high in (
             *((name, "-", 0.0, 1.0) for name in ("learning_rate", "discount", "gae_lambda")), ("until", "%", 0.0, 100.0),
         ):  # fmt: skip
             checked_number(name, getattr(self, name), unit, above=low, most=high)
         checked_number("log_std", self.log_std, "-", least=-20.0, most=2.0)
         checked_number("margin", self.margin, "-", least=0.0, most=1.0)
-        widths = self.hidden if isinstance(self.hidden, tuple) else ()
-        whole = all(isinstance(width, int) and not isinstance(width, bool) and 1 <= width <= WIDEST for width in widths)
-        if not (whole and 1 <= len(widths) <= LAYERS):
+        make_plain(self)
+        widths = [whole_of(width) or 0 for width in self.hidden] if isinstance(self.hidden, tuple) else []
+        if not (all(1 <= width <= WIDEST for width in widths) and 1 <= len(widths) <= LAYERS):
             raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers from 1 to {WIDEST}")
+        object.__setattr__(self, "hidden", tuple(widths))
         if not (isinstance(self.beside, tuple) and all(isinstance(one, str) for one in self.beside)):
             raise ValueError(f"beside = {shown(self.beside)}; allowed: ids of residual environments, with hands after a space")
         for name, plain in (("target", TARGETS[0]), ("beside", ())):
@@ -132,15 +134,16 @@ def configuration_names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
-def load_configuration(name: str | Path) -> tuple[TrainingSettings, ResidualSettings]:
+def load_configuration(name: str | os.PathLike[str]) -> tuple[TrainingSettings, ResidualSettings]:
     """Settings from a TOML file with tables ``[training]`` and ``[residual]``, or from one that comes with the package.
 
     Raises ``ValueError`` naming the file and what it has that is unknown.
     """
-    path = FOLDER / f"{name}.toml" if str(name) in configuration_names() else Path(name)
+    text = path_of(name) or ""
+    path = FOLDER / f"{text}.toml" if text in configuration_names() else Path(text)
     if not path.is_file():
         raise ValueError(
-            f"configuration = {shown(str(name))} is no file{near(str(name), configuration_names())}; allowed: "
+            f"configuration = {shown(text or name)} is no file{near(text, configuration_names())}; allowed: "
             f"{', '.join(configuration_names())}, or a TOML file"
         )
     content = read_toml("configuration", path)

@@ -19,7 +19,7 @@ from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork
-from agents.training.checkpoint import read_checkpoint, tensors, write_checkpoint
+from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS
 from agents.training.lanes import Lanes, observations
@@ -30,6 +30,9 @@ from birthsim_env.physics.compiled.lanes import Array
 
 LEAST_RATE = 0.01
 """Fraction of the learning rate at the end, to which it falls linearly."""
+
+FREE = ("past", "state", "lanes")
+"""Keys of a checkpoint below which whatever restores them looks itself."""
 
 OBSERVED, LEAST = 64, 0.4
 """Rigs whose observations, during an episode, say how to normalise; the least standard deviation of an entry, in its scale."""
@@ -79,12 +82,15 @@ class PolicyGradient:
 
     def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
         """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
-        return read_checkpoint(self._folder, settings, self._restore)
+        return read_checkpoint(self._folder, settings, lambda: self._content({}), self._restore, self._restore, FREE)
 
     def _restore(self, content: dict[str, Any]) -> dict[str, Any]:
         self._policy.load_state_dict(tensors(content["policy"]))
         self._adam.load_state_dict(tensors(content["adam"]))
-        self.steps = int(content["steps"])
+        require_moments(self._adam)
+        self.steps = content["steps"]
+        if self.steps < 0:
+            raise ValueError(f"steps = {self.steps}; allowed: >= 0")
         for group, state in zip(self._groups, content["groups"], strict=True):
             group.restore(state)
         past: dict[str, Any] = content["past"]
@@ -169,8 +175,10 @@ class PolicyGradient:
         return PolicyNetwork(self._mean, self._variance, layers, squashed=True)
 
     def _save(self, reached: Reached) -> None:
-        content = {
-            "past": reached.past(), "policy": self._policy.state_dict(), "adam": self._adam.state_dict(), "steps": self.steps,
+        write_checkpoint(self._folder, reached.describe(), self._content(reached.past()))
+
+    def _content(self, past: dict[str, Any]) -> dict[str, Any]:
+        return {
+            "past": past, "policy": self._policy.state_dict(), "adam": self._adam.state_dict(), "steps": self.steps,
             "groups": [group.state() for group in self._groups],
         }  # fmt: skip
-        write_checkpoint(self._folder, reached.describe(), content)

@@ -15,7 +15,7 @@ import numpy as np
 from baselines.admittance import knowledge, law
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.controller import check_flags, check_gains, require_stiffness
+from baselines.controller import check_flags, checked_gains, require_stiffness
 from baselines.estimation import inertial
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Impedance, mass_spring_damper
@@ -113,7 +113,7 @@ class AdmittanceController(StagedController):
         self, parameters: Parameters | str | Path | None = None, force_sensor: bool = True, learn: bool = True,
         identified: bool = False, **gains: float,
     ) -> None:  # fmt: skip
-        check_gains(self, gains)
+        gains = checked_gains(self, gains)
         check_flags({"force_sensor": force_sensor, "learn": learn, "identified": identified})
         if identified and force_sensor:
             raise ValueError(f"identified = {identified!r} with a force sensor; allowed: only where force_sensor is False")

@@ -25,7 +25,7 @@ from birthsim_env.physics.compiled.records import Numbers, part
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.values import is_within, limits, shown
+from birthsim_env.physics.rig.values import is_within, limits, plain, shown
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -140,7 +140,7 @@ class BacksteppingController(StagedController):
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
         super().__init__(parameters)
-        self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
+        self.damping_ratio, self.frozen_friction, self.valves = plain(damping_ratio), bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
         self._options = Options.numbers(

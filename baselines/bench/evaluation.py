@@ -19,14 +19,20 @@ from baselines.bench.statistics import jsonable, number, penalize_lost, summariz
 from baselines.controller import Controller, Law, controller_of
 from baselines.staged import Driving, driving
 from baselines.tables import aligned, markdown
-from birthsim_env.assembly import Arguments, spelled_out
+from birthsim_env.assembly import Arguments, refuse_unknown, spelled_out
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.physics.rig.values import shown
+from birthsim_env.physics.rig.values import checked_count, shown
 from birthsim_env.simulation import Simulation
+
+GIVEN = ("policy_period", "actuation")
+"""Arguments of an environment that an evaluation sets itself."""
 
 LANES = 256
 """Episodes that run side by side."""
+
+MOST_EPISODES, MOST_SEED = 10**9, 2**63 - 1
+"""Of an evaluation."""
 
 AT_ONCE = 250
 """Control periods between two looks at what is lost, where nothing stops the loop."""
@@ -78,7 +84,7 @@ class Evaluation:
         }
 
 
-@spelled_out("policy_period", "actuation")
+@spelled_out(*GIVEN)
 def evaluate(
     environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True,
     **arguments: Unpack[Arguments],
@@ -90,8 +96,7 @@ def evaluate(
     lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
     episodes that are complete are returned.
     """
-    if not (isinstance(episodes, int) and episodes >= 1):
-        raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")
+    episodes, seed = checked_count("episodes", episodes, 1, MOST_EPISODES), checked_count("seed", seed, 0, MOST_SEED)
     return evaluate_worlds(environment, controller, name, range(seed, seed + episodes), None, progress, **arguments)
 
 
@@ -100,6 +105,7 @@ def evaluate_worlds(
     **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
+    refuse_unknown(arguments, ("device",), GIVEN)
     if arguments.get("device") is not None:
         said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
         raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]

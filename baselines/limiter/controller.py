@@ -20,7 +20,7 @@ IEEE Transactions on Robotics and Automation 18(1), 2002. Figures without a sour
 """
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
+from birthsim_env.restored import ANY, Declared
 
 MARGIN = 1.5
 """A law that renders half as much again as was asked for is not to be taken for one that makes energy."""
@@ -177,6 +178,9 @@ class PortLimiter(StagedController):
     a spring would; ``speed``, m/s, of the end effector relative to its target. Infinity switches a limit off. Raises
     ``ValueError`` for numbers that are not positive.
     """
+
+    in_state: ClassVar[Declared] = {"_memories": ANY}
+    """NaN stands for what there is no past of."""
 
     def __init__(self, law: Controller, parameters: Parameters, capacity: float = 0.015, speed: float = 0.5) -> None:
         for name, value, unit in (("capacity", capacity, "J"), ("speed", speed, "m/s")):

@@ -21,7 +21,7 @@ def recall(kept: Array, newest: Array, slots: int, late: float, signals: Array, 
     ``kept`` (``slots`` S, N) is a ring, whose ``newest`` (N,) period is the last; NaN before the first one, which then counts
     as all that were before."""
     count = signals.shape[0]
-    last = int(newest[i])
+    last = int(newest[i]) % slots  # whatever a state holds that was restored
     head = (last + 1) % slots
     place = min(max(late, 0.0), slots - 1.001)
     whole = int(place)

@@ -18,7 +18,7 @@ import numpy as np
 
 from baselines.admittance import knowledge
 from baselines.admittance.rows import Beliefs, Known, Memory
-from baselines.controller import check_gains, require_stiffness
+from baselines.controller import checked_gains, require_stiffness
 from baselines.estimation import admittance, reference_friction
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Impedance, mass_spring_damper
@@ -164,7 +164,7 @@ class NonlinearMPC(StagedController):
     }  # fmt: skip
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
-        check_gains(self, gains)
+        gains = checked_gains(self, gains)
         super().__init__(parameters)
         self._gains = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
 

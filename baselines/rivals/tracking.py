@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
-from baselines.controller import check_gains, require_stiffness
+from baselines.controller import checked_gains, require_stiffness
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.stages import compliant_motion, pistons
 from baselines.impedance import Impedance, mass_spring_damper
@@ -67,7 +67,7 @@ class TrackingController(StagedController, ABC):
             cls.TUNABLE = {name: row[:2] for name, row in cls.GAINS.items()}
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
-        check_gains(self, gains)
+        gains = checked_gains(self, gains)
         super().__init__(parameters)
         # For exact and for sampled positions.
         self._gains = [{name: float(gains.get(name, row[2 + k])) for name, row in self.GAINS.items()} for k in range(2)]

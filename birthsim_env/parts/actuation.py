@@ -125,7 +125,8 @@ class _ByLayout(Forgetful):
         self._action: Array = np.zeros((self.size, 0))
 
     def begin(self, lanes: Mask) -> None:
-        pass
+        if self._action.shape[1] != len(lanes):
+            self._action = np.zeros((self.size, len(lanes)))
 
     def accept(self, actions: Array) -> None:
         self._action = np.array(actions, dtype=np.float64, order="C")

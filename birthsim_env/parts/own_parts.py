@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from birthsim_env.parts.callables import arguments_of
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.points import Sampled, Through
@@ -18,7 +19,8 @@ from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.times import timed
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
-from birthsim_env.physics.rig.values import is_finite, problem, shown
+from birthsim_env.physics.rig.arrays import floats_of
+from birthsim_env.physics.rig.values import is_finite, path_of, problem, shown
 from birthsim_env.tables.columns import columns, table_file
 
 COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
@@ -87,9 +89,9 @@ def _called(kind: str, call: str, function: Callable[..., Any], arguments: tuple
     except Exception as error:
         raise ValueError(f"{kind}: {call} fails ({problem(error)}); allowed: {expected}") from error
     try:
-        return checked(call, np.ravel(value), (2,), "SI")
+        return checked(call, floats_of(value).ravel(), (2,), "SI")
     except ValueError as error:
-        raise ValueError(f"{kind}: {call} = {shown(value)}; allowed: {expected}") from error
+        raise ValueError(f"{kind}: {call} = {shown(value)} ({error}); allowed: {expected}") from error
 
 
 class PlainHand(UserForce):
@@ -98,13 +100,12 @@ class PlainHand(UserForce):
     EXPECTED = "a function of time (s), or of time, position (2,) and velocity (2,), that returns (Fx, Fy) in N"
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        takes = inspect.signature(function).parameters.values()
-        needed = [
-            one for one in takes if one.default is one.empty and one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
-        ]
-        if len(needed) not in (1, 3):
-            raise ValueError(f"user_force: a function of {len(needed)} arguments; allowed: {self.EXPECTED}")
-        self._function, self.closed_loop = function, len(needed) == 3
+        takes = arguments_of(function)
+        felt = takes.take(3) and takes.needed != 1  # what takes any number of arguments gets all that there are
+        if not (felt or takes.take(1)):
+            keywords = f" and {', '.join(takes.keywords)}" if takes.keywords else ""
+            raise ValueError(f"user_force: a function of {takes.needed} arguments{keywords}; allowed: {self.EXPECTED}")
+        self._function, self.closed_loop = function, felt
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((time.shape[0], 2, time.shape[1]))
@@ -117,10 +118,11 @@ class PlainHand(UserForce):
 
 def _made(kind: str, part: Any, base: type, expected: str) -> Any:
     """A ``base`` or a function: what a user gave, or named as file.py:Name; of a class an instance."""
-    if isinstance(part, (str, Path)):
-        if ".py:" not in str(part):
-            raise ValueError(f"{kind} = {shown(str(part))}; allowed: {expected}")
-        part = from_file(kind, str(part))
+    path = path_of(part)
+    if path is not None:
+        if ".py:" not in path:
+            raise ValueError(f"{kind} = {shown(path)}; allowed: {expected}")
+        part = from_file(kind, path)
     if inspect.isclass(part):
         try:
             part = part()
@@ -176,8 +178,9 @@ def hand_of(user_force: Any, varied: bool) -> UserForce:
     Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
     """
     expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
-    if isinstance(user_force, (str, Path)) and str(user_force) in HANDS:
-        return HANDS[str(user_force)][varied]()
+    path = path_of(user_force)
+    if path in HANDS:
+        return HANDS[path][varied]()
     if file := table_file(user_force):
         rows = columns("user_force", file, FORCE, tuple(FORCE))
         return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])

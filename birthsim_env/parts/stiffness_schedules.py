@@ -4,7 +4,7 @@ stiffness (minimum-jerk transitions, since a chamber takes time to fill)."""
 import copy
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.rig.values import checked_number, checked_range, shown
+from birthsim_env.restored import Declared, Kept
 
 SOFTEST, STIFFEST = 1e-3, 1e7
 """N/m: setpoints that can be asked for; steel rods of this size are as stiff."""
@@ -41,6 +42,9 @@ class StiffnessSchedule:
     """
 
     timed: Timed | None = None
+
+    in_state: ClassVar[Declared] = {"_values": Kept(SOFTEST, STIFFEST, at=(slice(None), slice(0, 4)))}
+    """Of the coupling, the last row, what is allowed hangs on the others."""
 
     def __init__(
         self,

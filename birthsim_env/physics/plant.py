@@ -11,6 +11,7 @@ from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.rig.arrays import floats_of, shape_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import checked_count, is_within, shown
 
@@ -27,9 +28,9 @@ LONGEST = 3600.0
 def checked(name: str, value: ArrayLike, shape: tuple[int, ...], unit: str) -> Array:
     """``value`` as a contiguous float64 array of ``shape``, or a ``ValueError`` that names what is wrong with it."""
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
-        raise ValueError(f"{name} = {shown(value)}; allowed: numbers of shape {shape} ({unit})") from error
+        array = np.ascontiguousarray(floats_of(value))
+    except ValueError as error:
+        raise ValueError(f"{name} = {shown(value)}: {error}; allowed: numbers of shape {shape} ({unit})") from error
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}; allowed: {shape} ({unit})")
     if not np.isfinite(array).all():
@@ -170,9 +171,6 @@ class Plant:
 
     def _force_samples(self, user_force: ArrayLike) -> Array:
         """The user's force as (K, 2, num_envs), from that shape with K >= 1 or from (2, num_envs)."""
-        try:
-            samples = np.shape(user_force)[:-2]
-        except ValueError:  # a ragged list, which ``checked`` refuses by name
-            samples = ()
+        samples = shape_of(user_force)[:-2]
         several = samples if len(samples) == 1 and samples[0] > 0 else ()
         return checked("user_force", user_force, (*several, 2, self.num_envs), "N").reshape(-1, 2, self.num_envs)

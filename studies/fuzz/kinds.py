@@ -8,6 +8,7 @@ from studies.fuzz.json_files import JSON_FILES
 from studies.fuzz.logs import LOGS
 from studies.fuzz.own_parts import OWN_PARTS
 from studies.fuzz.sealed import SEALED
+from studies.fuzz.states import STATES
 from studies.fuzz.tables import TABLES
 
-KINDS: dict[str, Kind] = {**FILES, **JSON_FILES, **LOGS, **OWN_PARTS, **TABLES, **SEALED, **CALLS, **COMMANDS}
+KINDS: dict[str, Kind] = FILES | JSON_FILES | LOGS | OWN_PARTS | TABLES | SEALED | STATES | CALLS | COMMANDS

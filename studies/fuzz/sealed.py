@@ -14,7 +14,7 @@ from studies.fuzz.mutations import Rng, altered, damaged, json_bytes
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"law": {"pooled_mm": 2.5}, "policy": None, "curve": [{"steps": 0, "x": 0.1}]}
 
 
-def _changed(rng: Rng, arrays: dict[str, Any]) -> dict[str, Any]:
+def changed(rng: Rng, arrays: dict[str, Any]) -> dict[str, Any]:
     """Arrays of which one is gone, has another name, shape or type, or numbers that are not finite."""
     arrays = dict(arrays)
     name = sorted(arrays)[rng.integers(len(arrays))]
@@ -53,7 +53,7 @@ def _sealed(rng: Rng, content: bytes, form: str) -> bytes:
     about = altered(rng, about) if choice < 0.8 else about
     if not isinstance(about, dict):
         about = {"format": form}
-    return sealed(_changed(rng, arrays) if choice > 0.7 else arrays, {**about, "format": form})
+    return sealed(changed(rng, arrays) if choice > 0.7 else arrays, {**about, "format": form})
 
 
 def _policies(name: str) -> Callable[[Path], bytes]:

@@ -100,10 +100,10 @@ class Labour:
         for one in fields(self):
             value = getattr(self, one.name)
             if isinstance(one.default, int):
-                checked_count(one.name, value, 1, 1000)
+                object.__setattr__(self, one.name, checked_count(one.name, value, 1, 1000))
             else:
                 least = -10.0 if one.name in ("start_x", "start_y", "heading") else 0.0
-                checked_number(one.name, value, "SI", least=least, most=LONGEST)
+                object.__setattr__(self, one.name, checked_number(one.name, value, "SI", least=least, most=LONGEST))
         for name in ("lasts", "push_lasts", "yield_width", "damping", "stiffness", "floor_stiffness", "radius", "blend"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} = 0; allowed: more than 0")

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 
@@ -208,7 +209,7 @@ def test_steps_of_any_length_run_the_control_periods_that_are_complete(written, 
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_a_state_comes_back_and_goes_through_bytes(written, unit, version):
+def test_a_state_comes_back(written, unit, version):
     one = unit(written("--controller", "backstepping", "--sensors", "lab", "--fmi", version))
     one.step(20)
     get, put = (one.unit.getFMUstate, one.unit.setFMUstate) if one.two else (one.unit.getFMUState, one.unit.setFMUState)
@@ -219,6 +220,46 @@ def test_a_state_comes_back_and_goes_through_bytes(written, unit, version):
     one.ticks = 20
     one.step(30)
     assert one.get(STATE_NAMES).tolist() == after.tolist()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_bytes_of_a_state_come_back_and_damaged_ones_are_refused(written, unit, version):
+    """Flipped words of the loop's description would be jumped to and indexed; a flipped one of its memory is a number."""
+    one = unit(written("--controller", "backstepping", "--sensors", "lab", "--fmi", version))
+    names = ("serializeFMUstate", "deSerializeFMUstate", "setFMUstate", "getFMUstate")
+    write, read, put, get = (
+        getattr(one.unit, name if one.two else name.replace("FMUs", "FMUS").replace("deS", "des")) for name in names
+    )
+    one.step(20)
+    content = bytes(write(get()))
+    one.step(30)
+    after = one.get(STATE_NAMES)
+
+    def run(content):
+        put(read(content))
+        one.ticks = 20
+        one.step(30)
+        return one.get(STATE_NAMES)
+
+    assert run(content).tolist() == after.tolist()
+    before, refused = get(), 0
+    for place in range(0, len(content) // 8, 7):
+        words = np.frombuffer(content, dtype=np.int64).copy()
+        words[place] = 10**9
+        try:
+            read(words.tobytes())
+        except fmpy.fmi1.FMICallException:
+            refused += 1
+            continue
+        put(read(words.tobytes()))
+        one.ticks = 20
+        with suppress(fmpy.fmi1.FMICallException):
+            one.step(3)
+        put(before)
+    assert refused > 20
+    for wrong in (content[:-8], content + bytes(8), b""):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            read(wrong)
 
 
 WRONG = [

@@ -96,7 +96,7 @@ TABLE = [
             (both, "policy_period", (0.0015, 0.0004, 0, -0.01, INF, NAN, "10 ms"), "multiple of the control period 0.001 s"),
             (both, "duration", (0.0, -1, INF, "long"), "positive"),
             (both, "num_threads", (0, -1, 1.5, "2", True), "None or a whole number >= 1"),
-            (both, "picture_size", ((319, 480), (640, 239), (7681, 480), (640.0, 480.0), (640,), "640x480", None, (True, 480)),
+            (both, "picture_size", ((319, 480), (640, 239), (7681, 480), (640.5, 480.0), (640,), "640x480", None, (True, 480)),
              "two whole numbers from 320 x 240 to 7680 x 4320 px"),
         ]
     ),
@@ -142,7 +142,7 @@ TABLE = [
     (score, "score", (None, "1", True), "a number or an array of numbers"),
     (training, "step", (3,), "environment, algorithm, steps, "),
     (training, "algorithm", ("dqn",), "'ppo', 'sac', 'tqc'"),
-    (training, "steps", (0, -5, 1e6), "a whole number >= 1 and <= "),
+    (training, "steps", (0, -5, 1e6 + 0.5), "a whole number >= 1 and <= "),
     *((training, name, (0, True, "64"), "a whole number >= 1 and <= ") for name in (
         "lanes", "rollout", "epochs", "gradient_steps", "validation_lanes", "validations")),
     (training, "batch", (1, 2.5), "a whole number >= 2 and <= 1048576"),

@@ -60,7 +60,7 @@ class Bare:
 number = 3
 """
 HEAD, BINARY = ",".join(NAMES) + "\n", b"\xff\xfe\x00"
-A_CLASS = "; allowed: a class that"
+A_CLASS = "allowed: an object with command(measurement, reference) and reset(), a function law(measurement, reference)"
 CSV = "increasing times"
 
 
@@ -129,9 +129,9 @@ TABLE = {
         (None, ":Own", "own.py' does not exist; allowed: path/to/file.py:Name"),
         (PYTHON, ":Missing", "own.py' has no 'Missing'; allowed: a name that it defines: "),
         (PYTHON, ":", "own.py' has no ''; allowed: a name"),
-        (PYTHON, ":number", "own.py:number' cannot be made (TypeError: ", "); allowed: a class that takes the rig"),
+        (PYTHON, ":number", "own.py:number' is 3", "; allowed: an object with command(measurement, reference) and reset()"),
         (PYTHON, ":Wordless", "own.py:Wordless' is made without command() or reset()", A_CLASS),
-        (PYTHON, ":Bare", "cannot be made (TypeError: Bare() takes no arguments)", A_CLASS),
+        (PYTHON, ":Bare", "own.py:Bare' is made without command() or reset()", A_CLASS),
         ("import numpy\nimport no_such_module\n", ":Own", "own.py', line 2: ModuleNotFoundError: No module named 'no_such"),
     ],
     ("training", "own.toml"): [

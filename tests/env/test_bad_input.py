@@ -27,7 +27,7 @@ ACTIONS = [
     ((0, 0, 0, 0, 0), ("action has shape (5,)", "(4,)")),
     (np.zeros((1, 4)), ("action has shape (1, 4)", "(4,)")),
     (0.5, ("action has shape ()", "(4,)")),
-    (None, ("action has shape ()", "(4,)")),
+    (None, ("action = [None]", "4 numbers in [-1, 1]")),
     ("open", ("action = ", "'open'", "4 numbers")),
     (("a", "b", "c", "d"), ("action = ", "'a'", "4 numbers")),
     ({"P1": 1.0}, ("action = ", "'P1'", "4 numbers")),

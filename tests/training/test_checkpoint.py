@@ -1,7 +1,9 @@
 """A checkpoint: what it refuses, and that nothing in it is unpickled. What it brings back: ``test_kills``."""
 
 import contextlib
+import json
 import pickle
+import re
 from dataclasses import replace
 
 import gymnasium
@@ -99,3 +101,46 @@ def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, 
     with pytest.raises(ValueError, match=rf"is of a training with other {named}; allowed: the same settings"):
         train(settings, residual, tmp_path, rig)
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def _told(model, env):
+    """What the next steps of a training depend on, besides its lanes."""
+    random = np.random.get_state(legacy=False)["state"]["key"].tolist(), torch.get_rng_state().tolist()  # noqa: NPY002
+    weights = [weight.detach().numpy().tolist() for weight in model.policy.parameters()]
+    return weights, random, env.returns.tolist(), env.obs_rms.mean.tolist(), model.num_timesteps
+
+
+@pytest.mark.parametrize("algorithm", ["sac", "ppo"])
+def test_no_number_that_is_read_is_beyond_what_it_indexes_and_a_refusal_changes_nothing(tmp_path, algorithm):
+    """NumPy reads wherever its generator is said to stand; PyTorch takes moments of any shape, a buffer any position."""
+    model, env = new(algorithm)
+    model.learn(100)
+    save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
+    arrays, about = unsealed((tmp_path / NAME).read_bytes(), FORMAT)
+    other, world = new(algorithm, seed=1)
+    before, text = _told(other, world), json.dumps(about["content"])
+
+    def loaded(arrays, content):
+        (tmp_path / NAME).write_bytes(sealed(arrays, {**about, "content": json.loads(content)}))
+        return load_checkpoint(tmp_path, other, world, SETTINGS)
+
+    wrong = [
+        (arrays, re.sub(r'\["pos", \d+\]\]\}\], \["has_gauss"', '["pos", 1000000]]}], ["has_gauss"', text)),
+        ({**arrays, "/returns": np.zeros(3)}, text),
+        ({**arrays, "/returns": np.full(TINY.lanes, np.nan)}, text),
+        ({**arrays, "/last/0": np.zeros((2, 2), np.float32)}, text),
+        ({**arrays, "/lanes/episodes.elapsed": np.full(TINY.lanes, -1)}, text),
+        ({**arrays, "/lanes/lengths": np.full(TINY.lanes, -1)}, text),
+    ]
+    if algorithm == "ppo":
+        moments = next(name for name in arrays if name.endswith("exp_avg"))
+        wrong.append(({**arrays, moments: np.zeros((3, 3), np.float32)}, text))
+    else:
+        wrong += [(arrays, text.replace('["pos", 13]', f'["pos", {pos}]')) for pos in (10**9, -1)]
+    assert sum(changed != text for _, changed in wrong) == len(wrong) - 5 - (algorithm == "ppo"), "places were found"
+    for content in wrong:
+        with pytest.raises(ValueError, match=r"does not fit this version .*; allowed: a checkpoint that"):
+            loaded(*content)
+        assert _told(other, world) == before
+    assert loaded(arrays, text) == PAST
+    assert _told(other, world)[0] == _told(model, env)[0]

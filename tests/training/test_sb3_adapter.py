@@ -1,12 +1,15 @@
 """Stable-Baselines3's view of a native vector environment: the same rollouts, ends as its own wrappers report them; and what
 wrappers of ours change: a learner's shifted rewards are the same problem, a privileged one sees the true figures."""
 
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from agents.residual.privileged import FIGURES, true_figures
 from agents.training.sb3.adapter import SB3VecEnv
@@ -44,12 +47,17 @@ def test_rollouts_and_ends_are_those_of_stable_baselines_own_vectorization():
         np.testing.assert_array_equal(rewards, paid)
         np.testing.assert_array_equal(dones, ended)
         for lane, (info, its) in enumerate(zip(infos, theirs, strict=True)):
+            assert info.get("TimeLimit.truncated") is its["TimeLimit.truncated"]
+            assert ("episode" in info) == bool(dones[lane])
+            assert "no such entry" not in info
+            assert info.get("cost", 7.0) == its["cost"]
+            assert set(info) == set(its)
+            for name in its.keys() - {"episode"}:
+                np.testing.assert_array_equal(info[name], its[name], strict=True)
+                assert type(info[name]) is type(its[name]), name
             if not dones[lane]:
-                assert info == {}
+                assert copy.deepcopy(info).keys() == pickle.loads(pickle.dumps(info)).keys() == {**info}.keys() == its.keys()
                 continue
-            assert set(info) == {"terminal_observation", "TimeLimit.truncated", "episode", "is_success"}
-            np.testing.assert_array_equal(info["terminal_observation"], its["terminal_observation"])
-            assert (info["TimeLimit.truncated"], info["is_success"]) == (its["TimeLimit.truncated"], its["is_success"])
             # Monitor rounds the return to six digits.
             assert info["episode"] == {"r": pytest.approx(its["episode"]["r"], abs=1e-6), "l": its["episode"]["l"]}
             ends.add((lane, info["TimeLimit.truncated"]))
@@ -76,7 +84,7 @@ def test_a_reset_in_mid_episode_starts_return_and_length_anew():
     env.reset()
     infos = [env.step(np.zeros((3, 4), np.float32))[3] for _ in range(60)]
     assert [info["episode"]["l"] for info in infos[-1]] == [60, 60, 60]
-    assert not any(info for row in infos[:-1] for info in row)
+    assert not any("episode" in info for row in infos[:-1] for info in row)
 
 
 def test_attributes_are_read_for_the_lanes_asked_for_and_never_set():
@@ -168,3 +176,36 @@ def test_every_observation_has_the_figures_of_its_own_episode():
             ends += 1
     assert ends >= 8
     env.close()
+
+
+def test_a_monitor_finds_its_keywords_and_an_attribute_is_a_single_environments():
+    env = VecMonitor(adapted(duration=0.05), info_keywords=("cost", "is_success", "position"))
+    own = DummyVecEnv([lambda: gymnasium.make(PROBE, duration=0.05, randomize=True)] * 3)
+    seeded(env, 4), seeded(own, 4)
+    for _ in range(5):
+        *_, dones, infos = env.step(np.zeros((3, 4), np.float32))
+        own.step(np.zeros((3, 4), np.float32))
+    assert dones.all()
+    assert {"cost", "is_success", "position", "r", "l"} <= set(infos[0]["episode"])
+    assert [info["tracking_error"].shape for info in env.venv.reset_infos] == [(2,)] * 3
+    assert env.get_attr("duration") == own.get_attr("duration") == [0.05] * 3
+    for name in vars(type(own.envs[0].unwrapped)).keys() | {
+        "dt",
+        "parameters",
+        "steps",
+        "observation_names",
+        "action_space",
+        "spec",
+    }:
+        if not name.startswith("_") and not callable(getattr(own.envs[0].unwrapped, name)):
+            ours, theirs = env.get_attr(name), own.get_attr(name)
+            assert len(ours) == 3
+            assert all(type(one) is type(other) for one, other in zip(ours, theirs, strict=True)), name
+    for one, other in zip(env.get_attr("measurement"), own.get_attr("measurement"), strict=True):
+        np.testing.assert_array_equal(one.position, other.position, strict=True)
+        np.testing.assert_array_equal(one.time, other.time, strict=True)
+    for one, other in zip(env.get_attr("reference"), own.get_attr("reference"), strict=True):
+        np.testing.assert_array_equal(one.rows, other.rows, strict=True)
+    assert env.get_attr("scene", 1)[0].time == own.get_attr("scene", 1)[0].time
+    with pytest.raises(AttributeError, match="no_such"):
+        env.get_attr("no_such")

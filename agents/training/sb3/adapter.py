@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -12,14 +12,37 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from agents.training.sb3.lane_info import TRUNCATED, LaneInfo, lane_values
+from birthsim_env.face import measurement_of
+from birthsim_env.loop.signals import Reference
+from birthsim_env.restored import FLOATS, Kept
 from birthsim_env.state import State
+
+KEPT = {"returns": FLOATS, "lengths": Kept(0, whole=True)}
+"""What a state has of the episodes so far."""
+
+
+LANE_ATTRIBUTES: dict[str, Callable[[Any, int], Any]] = {
+    "action_space": lambda env, _: env.single_action_space,
+    "observation_space": lambda env, _: env.single_observation_space,
+    "measurement": lambda env, lane: measurement_of(env.measurement, lane),
+    "reference": lambda env, lane: Reference(env.reference.rows[:, lane]),
+    "scene": lambda env, lane: env.unwrapped.scene_of(lane),
+}
+"""What differs from lane to lane, or is another thing of one lane than of all."""
+
+
+def _shared(info: dict[str, Any]) -> dict[str, Any]:
+    """What is told of all lanes at this instant, without masks and what episodes ended with."""
+    return {name: values for name, values in info.items() if name[0] != "_" and name not in ("final_info", "final_obs")}
 
 
 class SB3VecEnv(VecEnv):
     """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
 
-    When the episode of lane i ends, ``infos[i]["episode"]`` has its return and length, and
-    ``infos[i]["terminal_observation"]`` its last observation, as with Stable-Baselines3's own wrappers. ``seconds`` is the time
+    ``infos[i]`` has what a single environment tells, such as ``cost``. When the episode of lane i ends, ``infos[i]["episode"]``
+    has its return and length besides, and ``infos[i]["terminal_observation"]`` its last observation, as with
+    Stable-Baselines3's own wrappers. ``seconds`` is the time
     spent in ``steps`` of the environment. ``staggered`` spreads the lanes over the episode, as ``BirthSIMVectorEnv.reset``
     says. An on-policy algorithm with rollouts shorter than an episode needs that.
     """
@@ -38,7 +61,9 @@ class SB3VecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Start all lanes; seeds given by ``seed`` count once."""
         seeds = list(self._seeds) if any(seed is not None for seed in self._seeds) else None
-        observation, _ = self.env.reset(seed=seeds, options={"staggered": True} if self._staggered else None)
+        observation, info = self.env.reset(seed=seeds, options={"staggered": True} if self._staggered else None)
+        shared = _shared(info)
+        self.reset_infos = [LaneInfo(shared, lane) for lane in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0
@@ -56,14 +81,15 @@ class SB3VecEnv(VecEnv):
         self.steps += 1
         self._returns += rewards
         self._lengths += 1
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        ended = terminated | truncated
-        for lane in np.flatnonzero(ended):
+        shared, ended = _shared(info), terminated | truncated
+        infos: list[dict[str, Any]] = [LaneInfo(shared, lane) for lane in range(self.num_envs)]
+        for lane in np.flatnonzero(ended).tolist():
+            self.reset_infos[lane] = infos[lane]
             infos[lane] = {
+                **lane_values(_shared(info["final_info"]), lane),
                 "terminal_observation": info["final_obs"][lane],
-                "TimeLimit.truncated": bool(truncated[lane]),
+                TRUNCATED: bool(truncated[lane]),
                 "episode": {"r": float(self._returns[lane]), "l": int(self._lengths[lane])},
-                **({"is_success": bool(info["final_info"]["is_success"][lane])} if "is_success" in info else {}),
             }
         self._returns[ended] = 0
         self._lengths[ended] = 0
@@ -75,15 +101,25 @@ class SB3VecEnv(VecEnv):
 
     def set_state(self, state: State) -> None:
         """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
-        self.env.set_state({name: value for name, value in state.items() if name not in ("returns", "lengths")})
-        self._returns[:], self._lengths[:] = state["returns"], state["lengths"]
+        own = {"returns": self._returns, "lengths": self._lengths}
+        for name, array in own.items():
+            if complaint := KEPT[name].complaint(array, state.get(name), np.inf):
+                raise ValueError(f"state: {name!r} {complaint}")
+        self.env.set_state({name: value for name, value in state.items() if name not in own})
+        for name, array in own.items():
+            array[:] = state[name]
 
     def close(self) -> None:
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """One value for each lane asked for; all lanes share the environment."""
-        return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
+        """One value for each lane asked for, as a single environment has it; else one that all lanes share.
+
+        Raises ``AttributeError`` for what neither has."""
+        lanes = list(self._get_indices(indices))
+        if attr_name in LANE_ATTRIBUTES:
+            return [LANE_ATTRIBUTES[attr_name](self.env, lane) for lane in lanes]
+        return [getattr(self.env, attr_name)] * len(lanes)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         raise NotImplementedError(f"set_attr({attr_name!r}): the lanes share one environment; make it with other arguments")

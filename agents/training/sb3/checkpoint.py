@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,27 @@ import numpy as np
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.training.checkpoint import read_checkpoint, tensors, write_checkpoint
+from agents.training.checkpoint import read_checkpoint, require_array, require_moments, tensors, write_checkpoint
 from agents.training.sb3.adapter import SB3VecEnv
+from birthsim_env.physics.rig.values import shown
+from birthsim_env.restored import is_beyond
+from birthsim_env.state import State
 
 REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 """Arrays in which SAC and TQC remember past steps."""
 
 
+FREE = ("past", "state", "lanes", "memory", "last", "random")
+"""Keys below which ``_restore``, or what it calls, looks itself: what optimizers remember, lanes, and what grows."""
+
+
 def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any], past: dict[str, Any]) -> None:
     """Write the training of ``model`` in ``env`` between two updates, its settings, and ``past``: JSON and arrays."""
-    content = {
+    write_checkpoint(folder, settings, _content(model, env, past, _adapter(env).get_state()))
+
+
+def _content(model: Any, env: VecNormalize, past: dict[str, Any], lanes: State) -> dict[str, Any]:
+    return {
         "past": past,
         "parameters": model.get_parameters(),
         "average": model.average.state_dict(),
@@ -28,7 +40,7 @@ def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
         "rewards": _statistics(env.ret_rms),
         "returns": env.returns,
         "last": [model._last_obs, model._last_episode_starts, model._last_original_obs],
-        "lanes": _adapter(env).get_state(),
+        "lanes": lanes,
         "memory": _memory(model),
         "random": [
             torch.get_rng_state(),
@@ -36,7 +48,6 @@ def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
             model.action_space.np_random.bit_generator.state,
         ],
     }
-    write_checkpoint(folder, settings, content)
 
 
 def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any]) -> dict[str, Any] | None:
@@ -44,11 +55,32 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
 
     Raises ``ValueError`` as ``read_checkpoint`` does.
     """
-    return read_checkpoint(folder, settings, lambda content: _restore(content, model, env))
+
+    def undo(content: dict[str, Any]) -> dict[str, Any]:
+        return _restore(content, model, env)
+
+    def restore(content: dict[str, Any]) -> dict[str, Any]:
+        past = undo(content)
+        _adapter(env).set_state(content["lanes"])  # last: it changes nothing where it refuses
+        return past
+
+    return read_checkpoint(folder, settings, lambda: _content(model, env, {}, {}), restore, undo, FREE)
 
 
 def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str, Any]:
+    past, shape = content["past"], (env.num_envs, *env.observation_space.shape)  # type: ignore[misc]
+    if not isinstance(past, dict):
+        raise TypeError("its past is no dictionary")
+    if min(content["counts"]) < 0:
+        raise ValueError(f"counts are {content['counts']}; allowed: >= 0")
+    if content["last"][0] is not None:
+        for name, array, own in zip(("last", "starts", "original"), content["last"], (shape, shape[:1], shape), strict=True):
+            require_array(name, array, own)
     model.set_parameters(tensors(content["parameters"]), exact_match=True, device="cpu")
+    for name in content["parameters"]:
+        part: Any = operator.attrgetter(name)(model)
+        if isinstance(part, torch.optim.Optimizer):
+            require_moments(part)
     model.average.load_state_dict(tensors(content["average"]))
     if content["entropy"] is not None:
         with torch.no_grad():
@@ -58,21 +90,31 @@ def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str
         running.mean, running.var, running.count = content[name]  # type: ignore[union-attr]
     env.returns = content["returns"]
     model._last_obs, model._last_episode_starts, model._last_original_obs = content["last"]
-    _adapter(env).set_state(content["lanes"])
-    memory = content["memory"]
-    if memory is not None:
-        buffer = model.replay_buffer
-        buffer.pos, buffer.full = memory["pos"], memory["full"]
-        for name in REMEMBERED:
-            getattr(buffer, name)[: len(memory[name])] = memory[name]
+    _remember(model, content["memory"])
     of_torch, of_numpy, of_actions = content["random"]
+    if is_beyond(of_numpy) or is_beyond(of_actions):
+        raise ValueError("random: a generator stands beyond its table")
     torch.set_rng_state(torch.from_numpy(of_torch))
     np.random.set_state(of_numpy)  # noqa: NPY002
     model.action_space.np_random.bit_generator.state = of_actions
-    past = content["past"]
-    if not isinstance(past, dict):
-        raise TypeError("its past is no dictionary")
     return past
+
+
+def _remember(model: Any, memory: dict[str, Any] | None) -> None:
+    """Put back what SAC and TQC remember of past steps; the next one is written at ``pos``."""
+    buffer = getattr(model, "replay_buffer", None)
+    if buffer is None or memory is None:
+        if (buffer is None) is not (memory is None):
+            raise ValueError("memory: there for algorithms that remember past steps, and for no others")
+        return
+    pos, full = memory["pos"], memory["full"]
+    if type(pos) is not int or type(full) is not bool or not 0 <= pos < buffer.buffer_size:
+        raise ValueError(f"memory: pos is {shown(pos)}, full is {shown(full)}; allowed: a position of {buffer.buffer_size}")
+    for name in REMEMBERED:
+        own = getattr(buffer, name)
+        require_array(f"memory/{name}", memory[name], (buffer.buffer_size if full else pos, *own.shape[1:]))
+        own[: len(memory[name])] = memory[name]
+    buffer.pos, buffer.full = pos, full
 
 
 def _memory(model: Any) -> dict[str, Any] | None:

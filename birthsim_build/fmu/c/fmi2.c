@@ -121,9 +121,13 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
   if (size != sizeof(Model)) return refuse(c, "the bytes are not as many as a state has");
+  Model read;
+  memcpy(&read, bytes, sizeof read);
+  const char *why = model_damage(&read);
+  if (why) return refuse(c, why);
   if (!*state) *state = malloc(sizeof(Model));
   if (!*state) return refuse(c, "no memory is left for a copy of the state");
-  memcpy(*state, bytes, sizeof(Model));
+  **(Model **)state = read;
   return fmi2OK;
 }
 

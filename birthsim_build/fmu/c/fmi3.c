@@ -124,8 +124,12 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte by
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
   if (size != sizeof(Model)) return refuse(c, "the bytes are not as many as a state has");
+  Model read;
+  memcpy(&read, bytes, sizeof read);
+  const char *why = model_damage(&read);
+  if (why) return refuse(c, why);
   if (!*state) *state = malloc(sizeof(Model));
   if (!*state) return refuse(c, "no memory is left for a copy of the state");
-  memcpy(*state, bytes, sizeof(Model));
+  **(Model **)state = read;
   return fmi3OK;
 }

@@ -59,6 +59,30 @@ static const char *model_refusal(const Model *m, unsigned k, double value) {
   return NULL;
 }
 
+static int model_is_within(const double *values, int first, int count) {
+  for (int k = 0; k < count; k++)
+    if (!(values[k] >= model_least[first + k] && values[k] <= model_most[first + k])) return 0;
+  return 1;
+}
+
+/* NULL, or why m, read from bytes, is no state of this model. By words that no step changes code jumps and indexes. */
+static const char *model_damage(const Model *m) {
+  int32_t at = 0, ranges = (int32_t)(sizeof model_changing / sizeof *model_changing);
+  for (int k = 0; k <= ranges; k++) {
+    int32_t next = k < ranges ? model_changing[k][0] : MODEL_MEMORY;
+    size_t constant = sizeof(double) * (size_t)(next - at);
+    if (memcmp(m->memory + at, birthsim_image + at, constant)) return "the bytes are of another model, or damaged";
+    at = k < ranges ? model_changing[k][1] : at;
+  }
+  if (m->state < SETTING_UP || m->state > OVER || m->periods < 0 || !isfinite(m->began) || !isfinite(m->time))
+    return "the bytes are damaged: there is no such time or state";
+  double inputs[MODEL_INPUTS];
+  for (int k = 0; k < MODEL_INPUTS; k++) inputs[k] = m->memory[model_place[k]];
+  if (!model_is_within(m->parameters, 0, MODEL_PARAMETERS) || !model_is_within(inputs, MODEL_PARAMETERS, MODEL_INPUTS))
+    return "the bytes are damaged: a value is outside of its limits";
+  return NULL;
+}
+
 /* Whole control periods up to now + step, s; NULL, or why not. After a refusal the simulation is over. */
 static const char *model_advance(Model *m, double now, double step) {
   double due = (now + step - m->began) / MODEL_PERIOD;

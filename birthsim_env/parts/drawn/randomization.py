@@ -11,6 +11,7 @@ import numpy as np
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
+from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters, field_of, least_dead_volume
 from birthsim_env.physics.rig.values import is_finite, shown
 
@@ -101,7 +102,7 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
             raise ValueError(
                 f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes{more}"
             )
-        pair = tuple(bounds) if isinstance(bounds, (tuple, list, np.ndarray)) and np.shape(bounds) == (2,) else (math.nan,) * 2
+        pair = tuple(bounds) if isinstance(bounds, (tuple, list, np.ndarray)) and shape_of(bounds) == (2,) else (math.nan,) * 2
         if not (is_finite(pair[0]) and is_finite(pair[1]) and pair[0] <= pair[1]):
             raise ValueError(f"randomize[{shown(name)}] = {shown(bounds)}; allowed: (low, high), finite and ordered")
         low, high = float(pair[0]), float(pair[1])

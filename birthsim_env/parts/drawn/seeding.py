@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from birthsim_env.physics.rig.values import checked_range, shown
+from birthsim_env.physics.rig.values import checked_range, shown, whole_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,17 +22,20 @@ def stream(lane_seed: int, episode: int, name: str) -> np.random.Generator:
 
 def lane_seeds(seed: int | list[int | None] | None, num_envs: int, generator: np.random.Generator) -> list[int]:
     """One seed per lane: ``seed + i`` for an integer, the given ones for a list; missing ones come from ``generator``."""
-    if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
-        if seed < 0:
+    first = whole_of(seed)
+    if first is not None:
+        if first < 0:
             raise ValueError(f"seed = {shown(seed)}; allowed: None or a whole number >= 0")
-        return [int(seed) + i for i in range(num_envs)]
-    if seed is not None and (isinstance(seed, str) or not isinstance(seed, (Sequence, np.ndarray))):
+        return [first + i for i in range(num_envs)]
+    listed = seed.tolist() if isinstance(seed, np.ndarray) else seed
+    if listed is not None and (isinstance(listed, (str, bytes)) or not isinstance(listed, Sequence)):
         raise ValueError(f"seed = {shown(seed)}; allowed: None, an integer, or one entry for each of {num_envs} lanes")
-    given: list[int | None] = [None] * num_envs if seed is None else list(seed)
+    given: list[int | None] = [None] * num_envs if listed is None else list(listed)
     if len(given) != num_envs:
         raise ValueError(f"seed has {len(given)} entries; allowed: None, an integer, or one entry for each of {num_envs} lanes")
     for lane, s in enumerate(given):
-        if not (s is None or (isinstance(s, (int, np.integer)) and not isinstance(s, bool) and s >= 0)):
+        number = 0 if s is None else whole_of(s)
+        if number is None or number < 0:
             raise ValueError(f"seed[{lane}] = {shown(s)}; allowed: None or an integer >= 0")
     return [int(generator.integers(2**63)) if s is None else int(s) for s in given]
 

@@ -1,6 +1,7 @@
 """The force of uterine contractions with maternal pushes."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, row, rows
 from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
+from birthsim_env.restored import Declared, Kept
 
 
 class Contraction(Rows):
@@ -74,6 +76,8 @@ class Contractions(UserForce):
     Each contraction carries ``pushes`` sin^2 bumps of ``push`` times its amplitude over its middle half (assumed).
     """
 
+    in_state: ClassVar[Declared] = {"_own": Kept(0, "_waves", whole=True, index=True, at=(slice(None), Contraction.wave.first))}
+
     GRID = 0.05
     """s between knots: below 0.2 % of the amplitude in error."""
 
@@ -86,16 +90,16 @@ class Contractions(UserForce):
         push: Range = 0.25,
         heading: float = 0.0,
     ) -> None:
-        self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
-        self.heading = heading
         checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
-        checked_count("count", count, 1, MOST)
+        self.count = checked_count("count", count, 1, MOST)
         checked_number("lasts", lasts, "s", least=2 * self.GRID, most=3600.0)
         if not (isinstance(pushes, tuple) and len(pushes) == 2):
             raise ValueError(f"pushes = {shown(pushes)}; allowed: the least and the most pushes of a contraction")
-        checked_count("pushes, the most", pushes[1], checked_count("pushes, the least", pushes[0], 0, MOST), MOST)
+        least = checked_count("pushes, the least", pushes[0], 0, MOST)
+        self.pushes = least, checked_count("pushes, the most", pushes[1], least, MOST)
         checked_range("push", push, "1", least=0.0, most=1.0)
         checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
+        self.amplitude, self.lasts, self.push, self.heading = amplitude, lasts, push, heading
 
     def prepare(self, num_envs: int) -> None:
         time, (least, most) = np.arange(0.0, self.lasts, self.GRID), self.pushes

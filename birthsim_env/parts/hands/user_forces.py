@@ -4,7 +4,7 @@ A user's own force derives from ``UserForce`` and implements ``force``. The buil
 """
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,9 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.plant import checked
+from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
+from birthsim_env.restored import Declared, Kept
 
 STRONGEST = 1000.0
 """N: five times what clinicians pull; more breaks end stops within a policy step."""
@@ -84,9 +86,8 @@ def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) ->
     """
     force = hand.force(time, position, velocity)
     instants, lanes = time.shape
-    if instants == 1 and np.shape(force) == (2, lanes):
-        force = np.asarray(force)[None]
-    return checked("user_force.force(...)", force, (instants, 2, lanes), "N")
+    one = (2, lanes) if instants == 1 and len(shape_of(force)) == 2 else (instants, 2, lanes)
+    return checked("user_force.force(...)", force, one, "N").reshape(instants, 2, lanes)
 
 
 class Knot(Rows):
@@ -155,6 +156,8 @@ def _checked_knots(name: str, knots: Any, lanes: int = 1, like: Array = _NUMBERS
 class ForceProfile(CompiledForce):
     """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
 
+    in_state: ClassVar[Declared] = {"_knots": Kept(grows=True, shortest=1), "_counts": Kept(1, "_knots", whole=True)}
+
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
         if not (knots is None or isinstance(knots, (list, tuple))):
             raise ValueError(f"knots = {shown(knots)}; allowed: a list of (time, Fx, Fy)")
@@ -205,7 +208,7 @@ class AlternatingSteps(ForceProfile):
         checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
         checked_number("ramp", ramp, "s", least=0.0, most=0.3)
         checked_number("repeat", repeat, "s", least=8.0, most=LONGEST)
-        checked_count("repeats", repeats, 0, MOST)
+        repeats = checked_count("repeats", repeats, 0, MOST)
         self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
 
     @vectorised

@@ -5,7 +5,7 @@ Figures, their basis and the ranges that are drawn from are fields of ``physics.
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from birthsim_env.physics.compiled.compilation import helper, kernel, over
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.electronics import Electronics
+from birthsim_env.restored import Declared, Kept
 
 TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
 """Channels of random numbers; the pressures have the first four."""
@@ -175,6 +176,7 @@ class BoardSensors:
     """
 
     sampled = True
+    in_state: ClassVar[Declared] = {"_keys": Kept(least=0, most=2**64 - 1, whole=True)}
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         self._electronics, self._ranges = electronics, {}  # type: tuple[Electronics, dict[str, tuple[float, float]]]

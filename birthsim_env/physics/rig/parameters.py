@@ -1,6 +1,7 @@
 """The rig as data: a frozen, validated dataclass of sections, what they must fulfil together, and its TOML file."""
 
 import dataclasses
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from birthsim_env.files import write_text
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.sections import Air, Chambers, Cylinder, Friction, Geometry, Mechanics, Valves
-from birthsim_env.physics.rig.values import in_line, is_finite, near, shown
+from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
 
 __all__ = [
     "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters", "Valves", "field_of",
@@ -101,10 +102,12 @@ class Parameters:
         Three figures depend on bores and strokes, and follow where ``changes`` do not name them. The dead volume grows with the
         largest piston, the linkage with a stroke of cylinder 1 that it has no room for, and k2 with a longer cylinder 2.
         """
+        if not isinstance(changes, Mapping):
+            raise ValueError(f"changes = {shown(changes)}; allowed: a mapping such as {{'mechanics.mass': 4.0}}")
         grouped: dict[str, dict[str, Any]] = {}
         for dotted, value in changes.items():
-            section, _, name = dotted.partition(".")
             field_of(dotted)
+            section, _, name = dotted.partition(".")
             grouped.setdefault(section, {})[name] = value
         parts = {section: dataclasses.replace(getattr(self, section), **values) for section, values in grouped.items()}
         follow(parts, self, changes)
@@ -133,12 +136,12 @@ class Parameters:
                 changes.update({f"{section}.{name}": value for name, value in values.items()})
         return dataclasses.replace(cls().replace(changes), ranges=_own_ranges(sections.get(RANDOMIZE, {})))
 
-    def to_toml(self, path: str | Path) -> None:
+    def to_toml(self, path: str | os.PathLike[str]) -> None:
         """Write every value to a TOML file, one table per part."""
         write_text(Path(path), tomli_w.dumps(self.to_dict(options=True)))
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Self:
+    def from_toml(cls, path: str | os.PathLike[str]) -> Self:
         """Read a TOML file; raises ``ValueError`` naming the file and what is wrong in it."""
         tables = read_toml("parameters", path)
         try:
@@ -200,10 +203,10 @@ def least_dead_volume(rig: Parameters) -> float:
 
 def field_of(dotted: str) -> dataclasses.Field[Any]:
     """The field behind a dotted name such as ``"mechanics.mass"``; ``ValueError`` names the alternatives."""
-    section, _, name = dotted.partition(".")
+    section, _, name = dotted.partition(".") if isinstance(dotted, str) else (dotted, "", "")
     if section not in _SECTIONS:
-        like = [f"{one}.{dotted}" for one, part in _SECTIONS.items() if hasattr(part, dotted)]
-        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else ""
+        like = [f"{one}.{dotted}" for one, part in _SECTIONS.items() if isinstance(dotted, str) and hasattr(part, dotted)]
+        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else near(str(section), _SECTIONS)
         raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(_SECTIONS)}")
     fields = {field.name: field for field in dataclasses.fields(_SECTIONS[section])}  # type: ignore[arg-type]
     if name not in fields:
@@ -211,15 +214,16 @@ def field_of(dotted: str) -> dataclasses.Field[Any]:
     return fields[name]
 
 
-def load_parameters(parameters: Parameters | Mapping[str, Any] | str | Path | None) -> Parameters:
+def load_parameters(parameters: Parameters | Mapping[str, Any] | str | os.PathLike[str] | None) -> Parameters:
     """What ``parameters=`` accepts everywhere: nothing (defaults), a ``Parameters``, the path of a TOML file, or what such a
     file holds as a mapping: ``{"mechanics": {"mass": 4.0}}`` or ``{"mechanics.mass": 4.0}``."""
     if parameters is None:
         return Parameters()
     if isinstance(parameters, Parameters):
         return parameters
-    if isinstance(parameters, (str, Path)):
-        return Parameters.from_toml(parameters)
+    path = path_of(parameters)
+    if path is not None:
+        return Parameters.from_toml(path)
     if isinstance(parameters, Mapping):
         try:
             return Parameters.from_dict(dict(parameters))

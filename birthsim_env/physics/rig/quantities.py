@@ -4,7 +4,7 @@ import dataclasses
 import math
 from typing import Any
 
-from birthsim_env.physics.rig.values import is_within, limits, shown
+from birthsim_env.physics.rig.values import is_within, limits, make_plain, shown
 
 
 def quantity(
@@ -39,7 +39,7 @@ def _check_field(owner: str, field: dataclasses.Field[Any], value: Any) -> None:
     if m["choices"]:
         valid, allowed = isinstance(value, str) and value in m["choices"], f"one of {', '.join(map(repr, m['choices']))}"
     else:
-        valid = isinstance(value, (int, float)) and is_within(value, *bounds)
+        valid = is_within(value, *bounds)
         allowed = f"a finite number{limits(*bounds)} ({m['unit']})"
     if not valid:
         raise ValueError(f"{owner}.{field.name} = {shown(value)} is impossible; allowed: {allowed}")
@@ -62,6 +62,7 @@ class Part:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             _check_field(type(self).__name__, field, getattr(self, field.name))
+        make_plain(self)
         self._check_together()
 
     def to_dict(self, options: bool) -> dict[str, Any]:

@@ -4,8 +4,9 @@ import codecs
 import os
 import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
+
+from birthsim_env.physics.rig.values import path_of, shown
 
 LARGEST = 4 * 2**20
 """Bytes of a file of settings or numbers; a rig takes 2 kB, an hour of a trajectory at 10 ms 8 MB less its digits."""
@@ -13,14 +14,16 @@ LARGEST = 4 * 2**20
 NO_TEXT = "bytes that are no text"
 
 
-def named(path: str | Path) -> str:
+def named(path: str | os.PathLike[str]) -> str:
     """A path as errors name it; of one that is longer than any name, the end."""
-    text = str(path)
+    text = os.fspath(path)
     return repr(text if len(text) <= 200 else f"... {text[-80:]}")
 
 
-def read(name: str, path: str | Path, most: int = LARGEST) -> bytes:
+def read(name: str, path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
     """The content of a file of at most ``most`` bytes; ``ValueError`` begins with ``name``, the argument that says the path."""
+    if path_of(path) is None:
+        raise ValueError(f"{name} = {shown(path)}; allowed: the path of a file")
     try:
         with open(path, "rb") as file:
             # As much as is asked for is set aside at first. What says no size, such as a pipe, may send more.
@@ -63,7 +66,7 @@ def encoding_of(content: bytes) -> str:
     return "UTF-8"
 
 
-def read_text(name: str, path: str | Path, most: int = LARGEST) -> str:
+def read_text(name: str, path: str | os.PathLike[str], most: int = LARGEST) -> str:
     """The text of a file in UTF-8, without the mark that editors on Windows put before it; ``ValueError`` names ``name``, the
     file and another encoding."""
     content = read(name, path, most)
@@ -73,7 +76,7 @@ def read_text(name: str, path: str | Path, most: int = LARGEST) -> str:
     return content.decode("utf-8-sig")
 
 
-def read_toml(name: str, path: str | Path) -> dict[str, Any]:
+def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
     """The tables of a TOML file; ``ValueError`` names ``name`` and the file."""
     text = read_text(name, path)
     tables: dict[str, Any] = _parsed(f"{name} = {named(path)} is no TOML", lambda: tomllib.loads(text), "TOML")

@@ -1,10 +1,16 @@
-"""Values that a user gives: their words in errors, and the checks that many arguments share."""
+"""Values that a user gives: their words in errors, and the checks that many arguments share.
 
+One rule for numbers: Python's and NumPy's whole numbers and floats are numbers, and become Python's. A count may be a float
+without a fraction, such as 5.0. True and False, text, arrays (also of no dimension), fractions and decimals are no numbers.
+"""
+
+import dataclasses
 import difflib
 import math
+import os
 import sys
 from collections.abc import Iterable
-from numbers import Integral, Real
+from numbers import Integral, Rational, Real
 from typing import Any
 
 LONGEST = 160
@@ -47,11 +53,49 @@ def problem(error: BaseException) -> str:
     return text if len(text) <= 200 else f"{text[:196]} ..."
 
 
+def number_of(value: Any) -> int | float | None:
+    """``value`` as a number of Python's, or None where it is no number."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, Integral):
+        return int(value)
+    return float(value) if isinstance(value, Real) and not isinstance(value, Rational) else None
+
+
+def whole_of(value: Any) -> int | None:
+    """``value`` as a whole number of Python's, or None where it is none."""
+    number = number_of(value)
+    return int(number) if number is not None and (isinstance(number, int) or number.is_integer()) else None
+
+
+def plain(value: Any) -> Any:
+    """``value`` with numbers of Python's for those of NumPy, also in tuples: these compute in their own precision."""
+    if isinstance(value, tuple):
+        return tuple(map(plain, value)) if type(value) is tuple else value
+    number = number_of(value)
+    return value if number is None else number
+
+
+def make_plain(record: Any) -> None:
+    """``plain`` for every field of a frozen dataclass."""
+    for field in dataclasses.fields(record):
+        object.__setattr__(record, field.name, plain(getattr(record, field.name)))
+
+
+def path_of(value: Any) -> str | None:
+    """``value`` as the text of a path where it is text or an ``os.PathLike``, else None."""
+    try:
+        path = os.fspath(value)
+    except TypeError:
+        return None
+    return path if isinstance(path, str) else None
+
+
 def is_finite(value: Any) -> bool:
-    """Whether ``value`` is a real number that a float can hold."""
+    """Whether ``value`` is a number that a float can hold."""
+    number = number_of(value)
     # Comparisons of whole numbers and floats are exact; a conversion of a long one would be an OverflowError.
-    real = isinstance(value, Real) and not isinstance(value, bool)
-    return real and bool(-sys.float_info.max <= value <= sys.float_info.max)
+    return number is not None and -sys.float_info.max <= number <= sys.float_info.max
 
 
 def limits(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> str:
@@ -64,27 +108,29 @@ def limits(above: float = -math.inf, least: float = -math.inf, most: float = mat
 
 def is_within(value: Any, above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> bool:
     """Whether ``value`` is a finite number within limits."""
-    return is_finite(value) and value > above and least <= value <= most
+    number = number_of(value)
+    return number is not None and is_finite(number) and number > above and least <= number <= most
 
 
 def checked_number(name: str, value: Any, unit: str, **bounds: float) -> Any:
-    """``value`` if it is a finite number within ``bounds`` (``above``, ``least``, ``most``), else ``ValueError``."""
+    """``plain(value)`` if it is a finite number within ``bounds`` (``above``, ``least``, ``most``), else ``ValueError``."""
     if not is_within(value, **bounds):
         raise ValueError(f"{name} = {shown(value)}; allowed: a finite number{limits(**bounds)} ({unit})")
-    return value
+    return plain(value)
 
 
 def checked_range(name: str, value: Any, unit: str, **bounds: float) -> Any:
-    """``value`` if it is a finite number or (low, high), ordered, within ``bounds``, else ``ValueError``."""
+    """``plain(value)`` if it is a finite number or (low, high), ordered, within ``bounds``, else ``ValueError``."""
     pair = value if isinstance(value, tuple) else (value, value)
     if not (len(pair) == 2 and all(is_within(bound, **bounds) for bound in pair) and pair[0] <= pair[1]):
         words = f"a finite number{limits(**bounds)} or (low, high) of such, ordered"
         raise ValueError(f"{name} = {shown(value)}; allowed: {words} ({unit})")
-    return value
+    return plain(value)
 
 
 def checked_count(name: str, value: Any, least: int, most: int) -> int:
-    """``value`` if it is a whole number within limits, else ``ValueError``."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
+    """``value`` as Python's if it is a whole number within limits, else ``ValueError``."""
+    number = whole_of(value)
+    if number is None or not least <= number <= most:
         raise ValueError(f"{name} = {shown(value)}; allowed: a whole number >= {least} and <= {most}")
-    return int(value)
+    return number
