@@ -115,6 +115,8 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
 
 def settings_of(folder: Path) -> dict[str, Any]:
     """The settings of the training that left a policy; ``ValueError`` where they are missing or damaged."""
+    if not (folder / TRAINING).is_file():
+        raise ValueError(f"policy = {shown(str(folder))}; allowed: a folder with {TRAINING}, as birthsim train writes it")
     settings: dict[str, Any] = read_json("policy", folder / TRAINING, _TRAINED_ON)["settings"]
     return settings
 
