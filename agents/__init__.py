@@ -44,5 +44,7 @@ def __getattr__(name: str) -> Any:
     try:
         return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
     except ImportError as error:
-        extras = "agents,onnx" if name == "export_onnx" else "agents"
-        raise ImportError(f"{error}; {name} needs pip install 'birthsim[{extras}]'") from error
+        from birthsim_env.extras import installation
+
+        extras = ("agents", "onnx") if name == "export_onnx" else ("agents",)
+        raise ImportError(f"{error}; {name} needs {installation(*extras)}") from error

@@ -18,6 +18,7 @@ from baselines.limiter.controller import PortLimiter
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.staged import StagedController
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
+from birthsim_env.extras import installation
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import near, shown
@@ -116,7 +117,7 @@ def _factory(name: str) -> Factory:
             try:
                 factory: Factory = point.load()
             except ImportError as error:
-                needs = "; a policy needs the extra: pip install 'birthsim[agents]'" if plain == RESIDUAL else ""
+                needs = f"; a policy needs the extra: {installation('agents')}" if plain == RESIDUAL else ""
                 raise ValueError(f"{error}{needs}") from error
             return factory
     if plain.rpartition(":")[0].endswith(".py"):

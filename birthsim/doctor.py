@@ -28,6 +28,7 @@ class Settings:
 
 def main(_: Settings) -> None:
     """Print it."""
+    from birthsim_env.extras import installation
     from birthsim_env.physics.compiled.kept import cache_folder
 
     print(f"{'Python':12}{platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} processors")
@@ -43,7 +44,7 @@ def main(_: Settings) -> None:
     print(f"{'GPU':12}{graphics()}")
     print("\nextras")
     for extra, missing in extras().items():
-        mend = f"pip install 'birthsim[{extra}]'"
+        mend = installation(extra)
         print(f"{extra:12}{ABOUT.get(extra, ''):38}" + ("works" if not missing else mend))
 
 

@@ -118,7 +118,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       single environment, else all processors, at most `OMP_NUM_THREADS`.
     - `actuation`: an object of your own between action and valves (`birthsim_env.parts.actuation.Actuation`) instead of a mode.
     - `render_mode`: `None`, `"rgb_array"` or `"human"`, in real time; `picture_size`: (width, height) in px, (640, 480).
-      `gymnasium.wrappers.RecordVideo` needs `pip install 'birthsim[video]'`; its videos play in real time too.
+      `gymnasium.wrappers.RecordVideo` needs the extra `video`; its videos play in real time too.
 
     Controllers read `env.unwrapped.measurement` and `env.unwrapped.reference`, one rig's `Measurement` and `Reference`.
 

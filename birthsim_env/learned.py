@@ -9,7 +9,7 @@ from typing import Any
 
 def from_agents(module: str) -> Any:
     """A ``module`` below ``agents``; raises ``ImportError`` in one line where another package of that name is in its place."""
-    mend = "rename or uninstall it, then pip install --force-reinstall --no-deps birthsim (from a clone: -e .)"
+    mend = "rename or uninstall it, then pip install --force-reinstall --no-deps -e . in a clone"
     try:
         package = import_module("agents")
     except Exception as error:

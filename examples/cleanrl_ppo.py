@@ -1,6 +1,6 @@
 """PPO in one file, in the style and with the settings of CleanRL's ppo_continuous_action.py, on the native vector environment.
 
-python examples/cleanrl_ppo.py [id] [steps] [seed]         needs pip install 'birthsim[agents]'
+python examples/cleanrl_ppo.py [id] [steps] [seed]         needs pip install -e '.[agents]'
 """
 
 import sys

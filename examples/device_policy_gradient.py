@@ -1,6 +1,6 @@
 """A policy learns to drive the valves by gradients through the closed loop, whose lanes, tapes and tensors stay on a GPU.
 
-python examples/device_policy_gradient.py [cuda, host or cpu] [updates] [lanes]      needs pip install "birthsim[agents,cuda]"
+python examples/device_policy_gradient.py [cuda, host or cpu] [updates] [lanes]      needs pip install -e '.[agents,cuda]'
 
 Nothing here is reinforcement learning: PyTorch differentiates all rigs, drawn at random. ``host`` runs the threads of a GPU on
 this processor, ``cpu`` the native loop; all three have the same gradients, but for the order in which PyTorch adds.

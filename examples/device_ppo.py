@@ -1,6 +1,6 @@
 """PPO in one file whose data never leave the device: observations, rewards and actions are PyTorch's tensors there.
 
-python examples/device_ppo.py [cuda or host] [id] [steps] [seed] [lanes]      needs pip install "birthsim[agents,cuda]"
+python examples/device_ppo.py [cuda or host] [id] [steps] [seed] [lanes]      needs pip install -e '.[agents,cuda]'
 """
 
 import sys

@@ -1,6 +1,6 @@
 """How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, prints their scores.
 
-python examples/from_scratch.py --out out/scratch          needs pip install 'birthsim[agents]'; a run of 1 million steps
+python examples/from_scratch.py --out out/scratch          needs pip install -e '.[agents]'; a run of 1 million steps
                                                            takes minutes; what --out holds is kept
 """
 

@@ -1,7 +1,7 @@
 """PPO of RLlib; it makes single environments side by side.
 
 python examples/rllib_ppo.py [id] [steps]
-needs pip install 'birthsim[agents]' ray dm-tree lz4 ormsgpack pyarrow pandas pydantic tensorboardX requests
+needs pip install -e '.[agents]' ray dm-tree lz4 ormsgpack pyarrow pandas pydantic tensorboardX requests
 """
 
 import sys

@@ -1,6 +1,6 @@
 """PPO of Stable-Baselines3 with its default settings learns to drive the valves by itself; then how well, beside the laws.
 
-python examples/sb3_ppo.py [id] [steps] [seed]             needs pip install 'birthsim[agents]'
+python examples/sb3_ppo.py [id] [steps] [seed]             needs pip install -e '.[agents]'
 """
 
 import sys

@@ -1,6 +1,6 @@
 """PPO of TorchRL on the native vector environment.
 
-python examples/torchrl_ppo.py [id] [steps]                needs pip install 'birthsim[agents]' torchrl
+python examples/torchrl_ppo.py [id] [steps]                needs pip install -e '.[agents]' torchrl
 """
 
 import sys

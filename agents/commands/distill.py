@@ -12,6 +12,7 @@ from tqdm import tqdm
 from baselines.bench.statistics import number
 from baselines.commands.settings import PROCESSES, Configured, RigFile, Seed, whole
 from baselines.work.side_by_side import side_by_side
+from birthsim_env.extras import installation
 from birthsim_env.files import finite, make_folder, own_folder, write_json
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.schema import fault
@@ -22,7 +23,7 @@ try:
     from agents.training.student import Lessons, teach
     from agents.training.validation import merit
 except ImportError as error:
-    raise ImportError(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
+    raise ImportError(f"{error}; a student needs the extra: {installation('agents')}") from error
 
 TAUGHT = {"environment": str, "sensors": str, "randomize": (bool, str), "validation_lanes": range(1, 2**16 + 1)}
 """Name -> kind of what a student's training has in common with its teacher's."""

@@ -12,6 +12,7 @@ from baselines.commands.evaluate import Settings
 from baselines.commands.settings import RANDOMIZE
 from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
 from baselines.work.tasks import Result, run_tasks
+from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, whole_results, write_json, write_text
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -105,7 +106,7 @@ def _policies(path: str | None) -> tuple[list[Path], list[str], set[str]]:
         from agents.policy.files import load_policy
         from agents.policy.seeds import policy_folders
     except ImportError as error:
-        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+        raise ValueError(f"{error}; a policy needs the extra: {installation('agents')}") from error
     folders = policy_folders(path)
     policies = [load_policy(folder) for folder in folders]
     laws = dict.fromkeys(policy.settings.law for policy in policies)

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from baselines.bench.statistics import number
 from baselines.commands.settings import Configured
 from baselines.tables import aligned, markdown
+from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json, write_text
 
 
@@ -37,7 +38,7 @@ def main(settings: Settings) -> None:
         from agents.reports.correction_figure import draw_corrections
         from agents.residual.settings import NO_LAW
     except ImportError as error:
-        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+        raise ValueError(f"{error}; a policy needs the extra: {installation('agents')}") from error
     from baselines.registry import make_controller
     from birthsim_env.physics.rig.parameters import Parameters
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from baselines.commands.settings import Configured
+from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results
 
 
@@ -38,7 +39,7 @@ def _write_folder(settings: Settings) -> None:
         from agents.policy.seeds import best_policy
         from agents.reports.card import TRAINING, compared, model_card
     except ImportError as error:
-        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+        raise ValueError(f"{error}; a policy needs the extra: {installation('agents')}") from error
 
     folder = best_policy(settings.policy)
     card = model_card(folder, f"birthsim-{Path(settings.policy).name}", compared(folder))
@@ -58,7 +59,7 @@ def _write_file(settings: Settings) -> None:
         from agents.policy.onnx_export import TOLERANCE, export_onnx
         from agents.policy.seeds import best_policy
     except ImportError as error:
-        raise ValueError(f"{error}; exporting needs the extras agents and onnx: pip install 'birthsim[agents,onnx]'") from error
+        raise ValueError(f"{error}; exporting needs the extras agents and onnx: {installation('agents', 'onnx')}") from error
     folder = best_policy(settings.policy)
     policy = load_policy(folder)
     path = settings.out or folder / f"policy.{settings.to}"

@@ -13,6 +13,7 @@ from baselines.commands.settings import RANDOMIZE
 from baselines.commands.train import Settings
 from baselines.commands.worlds import check_environment, check_world
 from baselines.work.side_by_side import side_by_side
+from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, write_json
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
@@ -22,7 +23,7 @@ def run(settings: Settings) -> None:
     """Train every seed and report."""
     missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
     if missing:
-        raise ValueError(f"no {' and no '.join(missing)}; training needs the extra: pip install 'birthsim[agents]'")
+        raise ValueError(f"no {' and no '.join(missing)}; training needs the extra: {installation('agents')}")
     training, residual = _settings(settings)
     rig = load_parameters(settings.parameters)
     for name, hand in training.worlds():

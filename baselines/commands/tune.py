@@ -34,6 +34,7 @@ from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
 from baselines.tables import aligned
 from baselines.work.tasks import Task, result_of
+from birthsim_env.extras import installation
 from birthsim_env.files import own_folder, whole_results, write_json
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
@@ -140,7 +141,7 @@ def begun(start: Gains) -> Study:
     try:
         import optuna
     except ImportError as error:
-        raise ValueError(f"{error}; tuning needs the extra: pip install 'birthsim[tune]'") from error
+        raise ValueError(f"{error}; tuning needs the extra: {installation('tune')}") from error
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study()
     study.enqueue_trial(start)

@@ -18,6 +18,7 @@ import numpy as np
 
 import birthsim_env
 from baselines.logs.log import Log, Series
+from birthsim_env.extras import installation
 from birthsim_env.files import finite, whole_file
 
 _TYPES = {"f": "number", "i": "integer", "b": "boolean"}
@@ -40,7 +41,7 @@ def _write_parquet(log: Log, file: BinaryIO) -> None:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError as error:
-        raise ValueError(f"{error}; logs need the extra: pip install 'birthsim[log]'") from error
+        raise ValueError(f"{error}; logs need the extra: {installation('log')}") from error
     columns = {
         "topic": (
             pa.array(np.repeat([one.topic for one in log.series], [len(one.times) for one in log.series])),
@@ -64,7 +65,7 @@ def _write_mcap(log: Log, file: BinaryIO) -> None:
     try:
         from mcap.writer import Writer
     except ImportError as error:
-        raise ValueError(f"{error}; logs need the extra: pip install 'birthsim[log]'") from error
+        raise ValueError(f"{error}; logs need the extra: {installation('log')}") from error
     writer = Writer(file)
     writer.start(library=f"birthsim {birthsim_env.__version__}")
     writer.add_metadata("birthsim", _about(log))

@@ -17,6 +17,7 @@ from typing import Any
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
+from birthsim_env.extras import installation
 from birthsim_env.files import ENDINGS
 
 Work = Callable[..., Any]
@@ -127,7 +128,7 @@ def _on_cluster(work: Work, pieces: Pieces, cluster: str) -> Outcomes:
     try:
         import ray
     except ImportError as error:
-        raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
+        raise ValueError(f"{error}; --cluster needs the extra: {installation('cluster')}") from error
     address = cluster.partition(":")[2]
     host, _, port = address.rpartition(":")
     try:

@@ -21,6 +21,7 @@ from llvmlite.binding import llvm_version_info
 from birthsim_build.code.threads import Threads
 from birthsim_build.code.tools import run_tool
 from birthsim_build.image import Words
+from birthsim_env.extras import installation
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.sources import source_stamp
 from birthsim_env.physics.gradients.source import TEXTS
@@ -111,7 +112,7 @@ def require_llvm() -> None:
 def require_linker() -> None:
     """Raises ``ValueError`` where PyPI's ``ziglang`` is missing."""
     if not has_linker():
-        raise ValueError("linking needs the extra build: pip install 'birthsim[build]'")
+        raise ValueError(f"linking needs the extra build: {installation('build')}")
 
 
 def link(*arguments: str) -> None:

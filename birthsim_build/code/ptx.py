@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from birthsim_build.code.tools import run_tool
+from birthsim_env.extras import installation
 
 GPU = re.compile(r"sm_\d{2,3}[a-z]?")
 _FUNCTION = re.compile(r"Function properties for (\w+)\s+(\d+) bytes stack frame, (\d+) bytes spill stores")
@@ -23,7 +24,7 @@ def require_assembler() -> str:
     """Where ``ptxas`` is; raises ``ValueError`` where it is not."""
     found = assembler()
     if found is None:
-        raise ValueError("a cubin needs NVIDIA's ptxas: pip install 'birthsim[cuda]'")
+        raise ValueError(f"a cubin needs NVIDIA's ptxas: {installation('cuda')}")
     return found
 
 

@@ -18,6 +18,7 @@ from birthsim_build.bundle import make_bundle, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.ptx import require_assembler
 from birthsim_build.code.targets import BUILT, TARGETS
+from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -120,7 +121,7 @@ def _shipped() -> list[str]:
     try:
         from agents.policy.seeds import shipped_names
     except ImportError as error:
-        raise ValueError(f"{error}; --all needs the extra: pip install 'birthsim[agents]'") from error
+        raise ValueError(f"{error}; --all needs the extra: {installation('agents')}") from error
     return shipped_names()
 
 

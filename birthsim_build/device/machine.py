@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from birthsim_build.code.compiler import compile_object, require_llvm
 from birthsim_build.code.targets import HOST
 from birthsim_build.code.threads import Threads
+from birthsim_env.extras import installation
 from birthsim_env.physics.rig.values import shown
 
 WIDTH = 32
@@ -105,9 +106,7 @@ class Cuda:
             self.arrays.cuda.runtime.getDeviceCount()
         except Exception as error:
             said = str(error).strip().partition("\n")[0]
-            raise ValueError(
-                f"device = 'cuda' needs NVIDIA's driver and the extra: pip install 'birthsim[cuda]' ({said})"
-            ) from error
+            raise ValueError(f"device = 'cuda' needs NVIDIA's driver and the extra: {installation('cuda')} ({said})") from error
 
     def address(self, array: Any) -> int:
         return int(array.data.ptr)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from birthsim_env.extras import installation
 from birthsim_env.physics.rig.reading import named, read
 from birthsim_env.tables.mat_files import read_mat
 from birthsim_env.tables.table import Reading, Table
@@ -55,7 +56,7 @@ def _mcap(source: str, content: bytes, how: Reading) -> Table:
 
 
 def _missing(source: str, error: ImportError) -> ValueError:
-    return ValueError(f"{source}: {error}; allowed with the extra for logs: pip install 'birthsim[log]'")
+    return ValueError(f"{source}: {error}; allowed with the extra for logs: {installation('log')}")
 
 
 READERS: dict[str, Callable[[str, bytes, Reading], Table]] = {

@@ -10,6 +10,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from baselines.commands.start import endings
+from birthsim_env.extras import installation
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import Packed, write_page
 from birthsim_live.server.addresses import LOOPBACK, is_loopback, is_unspecified
@@ -26,7 +27,7 @@ def need_server() -> None:
 
         import birthsim_live.server.app  # noqa: F401
     except ImportError as error:
-        raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
+        raise ValueError(f"{error}; the page needs the extra: {installation('live')}") from error
 
 
 def serve(packed: Packed, rig: Parameters, listening: socket.socket, settings: "Settings", title: str) -> None:

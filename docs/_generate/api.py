@@ -7,6 +7,8 @@ import re
 import textwrap
 from importlib import import_module
 
+from _generate.sentences import first_sentence
+
 BEYOND = {
     "birthsim_env": (
         "env.BirthSIMEnv",
@@ -115,4 +117,4 @@ def _text(thing: object) -> str:
 
 def _first(thing: object) -> str:
     """The first sentence of a docstring."""
-    return re.split(r"(?<=[.:;])\s", " ".join((inspect.getdoc(thing) or "").split()))[0].rstrip(":;")
+    return first_sentence(" ".join((inspect.getdoc(thing) or "").split()))

@@ -9,6 +9,7 @@ import numpy as np
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.work.tasks import Result
+from birthsim_env.extras import installation
 from studies.sweeps.plan import Point
 from studies.tables import markdown
 
@@ -43,7 +44,7 @@ def write_parquet(rows: dict[str, list[Any]], path: Path) -> None:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError as error:
-        raise ValueError(f"{error}; sweeps need the extra: pip install 'birthsim[sweep]'") from error
+        raise ValueError(f"{error}; sweeps need the extra: {installation('sweep')}") from error
     columns = {}
     for name, values in rows.items():
         try:

@@ -9,6 +9,7 @@ import numpy as np
 
 from baselines.bench.statistics import penalize_lost, summarize
 from baselines.work.tasks import Result, Task
+from birthsim_env.extras import installation
 from studies.sweeps.plan import Point, Search, Sweep
 from studies.sweeps.work import Piece, complete, pieces_of
 
@@ -51,7 +52,7 @@ def _optuna() -> ModuleType:
     try:
         import optuna
     except ImportError as error:
-        raise ValueError(f"{error}; a search needs the extra: pip install 'birthsim[tune]'") from error
+        raise ValueError(f"{error}; a search needs the extra: {installation('tune')}") from error
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     return optuna
 

@@ -4,7 +4,7 @@ python -m studies.targets.gpu [cuda or host] [most lanes] [seconds a figure]
 
 Loops advance policy steps of 10 ms with all that an environment does, episodes that end and begin included. Arrays stay on the
 device, or come from NumPy and go back to it ("copied"); the same loop runs natively on one core of this processor. ``cuda``
-needs pip install "birthsim[cuda]".
+needs pip install -e '.[cuda]'.
 """
 
 import sys

@@ -42,7 +42,7 @@ def need_program(name, package):
 def need_linker():
     if llvm_version_info[0] < LEAST_LLVM:
         pytest.skip(f"LLVM {llvm_version_info[0]}; building needs {LEAST_LLVM}")
-    need(importlib.util.find_spec("ziglang"), "ziglang is missing: pip install 'birthsim[build]'")
+    need(importlib.util.find_spec("ziglang"), "ziglang is missing: pip install -e '.[build]'")
 
 
 def need_threads():

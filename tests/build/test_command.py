@@ -13,8 +13,8 @@ from tests.console import call
 LACKS = [
     # what is asked for, LLVM, what is not there, what is said
     ("wasm", (20, 1, 8), "compiler.find_spec", "llvmlite has LLVM 20.1.8; allowed: 22 or later, llvmlite 0.50"),
-    ("wasm", (22, 1, 0), "compiler.find_spec", "pip install 'birthsim[build]'"),
-    ("cubin", (22, 1, 0), "ptx.assembler", "a cubin needs NVIDIA's ptxas: pip install 'birthsim[cuda]'"),
+    ("wasm", (22, 1, 0), "compiler.find_spec", "pip install -e '.[build]'"),
+    ("cubin", (22, 1, 0), "ptx.assembler", "a cubin needs NVIDIA's ptxas: pip install -e '.[cuda]'"),
 ]
 
 
@@ -43,7 +43,7 @@ law_part("residual:circle", Parameters(), False)
 def test_laws_need_nothing_that_trains_policies():
     done = subprocess.run([sys.executable, "-c", WITHOUT_POLICIES], capture_output=True, text=True, check=False)
     assert int(done.stdout) > 1
-    assert done.stderr.rstrip().endswith("a policy needs the extra: pip install 'birthsim[agents]'")
+    assert done.stderr.rstrip().endswith("a policy needs the extra: pip install -e '.[agents]' in a clone")
 
 
 def test_kernels_and_programs(tmp_path, monkeypatch, capsys):

@@ -170,7 +170,7 @@ def test_what_no_device_does_is_refused_by_name(monkeypatch):
     with pytest.raises(ValueError, match=r"render_mode, with a device, = 'rgb_array'; allowed: None"):
         made("host", render_mode="rgb_array")
     monkeypatch.setitem(sys.modules, "cupy", None)
-    with pytest.raises(ValueError, match=r"'cuda' needs NVIDIA's driver and the extra: pip install 'birthsim\[cuda\]'"):
+    with pytest.raises(ValueError, match=r"'cuda' needs NVIDIA's driver and the extra: pip install -e '.\[cuda\]'"):
         made("cuda")
     env = made("host")
     with pytest.raises(RuntimeError, match=r"step\(\) before reset\(\)"):

@@ -68,7 +68,7 @@ def test_doctor_names_what_is_missing(monkeypatch, capsys):
     assert status == 0
     extras = {line.split()[0]: line for line in printed.partition("extras\n")[2].splitlines()}
     assert [name for name, line in extras.items() if not line.endswith("works")] == ["tune"]
-    assert extras["tune"].endswith("pip install 'birthsim[tune]'")
+    assert extras["tune"].endswith("pip install -e '.[tune]' in a clone")
     assert max(map(len, printed.splitlines())) <= 80 + len(str(Path.cwd()))
 
 

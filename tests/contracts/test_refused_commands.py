@@ -169,7 +169,7 @@ GONE = {
     "live --port 0 --replay a.rec": ("uvicorn", "live"), "export --to hub circle --out x": ("agents.policy.seeds", "agents"),
 }  # fmt: skip
 """Command -> a package or module that is not there, and the extra that has it."""
-TABLE |= {line: f"pip install 'birthsim[{extra}]'" for line, (_, extra) in GONE.items()}
+TABLE |= {line: f"pip install -e '.[{extra}]'" for line, (_, extra) in GONE.items()}
 
 
 @pytest.mark.parametrize("line", TABLE)

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-jax = pytest.importorskip("jax", reason="pip install 'birthsim[jax]'")
+jax = pytest.importorskip("jax", reason="pip install -e '.[jax]'")
 torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed")
 
 from agents.gradients import rollouts  # noqa: E402

@@ -147,7 +147,7 @@ def test_a_csv_file_takes_little_more_memory_than_its_bytes_and_numbers(tmp_path
 
 @pytest.mark.parametrize("value", [None, [1.0], "one", 10**400])
 def test_what_is_no_number_in_a_message_is_named_by_its_row(value: object, tmp_path: Path) -> None:
-    writer = pytest.importorskip("mcap.writer", reason="mcap is not installed: pip install 'birthsim[log]'").Writer
+    writer = pytest.importorskip("mcap.writer", reason="mcap is not installed: pip install -e '.[log]'").Writer
     content = rows()
     with (tmp_path / "log.mcap").open("wb") as file:
         log = writer(file)

@@ -64,7 +64,7 @@ def missing():
         import playwright  # noqa: F401
         import uvicorn  # noqa: F401
     except ImportError as error:
-        lacks.append(f"{error.name} (pip install 'birthsim[live,dev]')")
+        lacks.append(f"{error.name} (pip install -e '.[live,dev]')")
     if find_chromium() is None:
         lacks.append(f"Chromium ({INSTALLATION})")
     if not has_font():

@@ -24,7 +24,7 @@ STEP = np.finfo(float).eps ** (1 / 3)
 """Of central differences, relative to ``SCALES``: their truncation, its square, and rounding, eps over it, are both 4e-11."""
 ALLOWED = 1e-8
 """Relative to the largest entry of a row: 4e-11 times the curvature of the steepest characteristics."""
-MISSING = "python-control is not installed: pip install 'birthsim[control]'"
+MISSING = "python-control is not installed: pip install -e '.[control]'"
 
 
 def pose_of(rig: Parameters, y1: float, y2: float) -> Array:
@@ -207,7 +207,7 @@ def test_python_control_gives_the_same_response() -> None:
 
 def test_without_python_control_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "control", None)
-    with pytest.raises(ImportError, match=r"birthsim\[control\]"):
+    with pytest.raises(ImportError, match=r"pip install -e .\.\[control\]."):
         linearize(None, (0.5, 0.0)).to_control()
 
 

@@ -23,7 +23,7 @@ def test_a_foreign_package_is_named(script, content, tmp_path):
     (tmp_path / "agents" / "__init__.py").write_text(content, encoding="utf-8")
     done = run(script, tmp_path)
     said = done.stderr.strip().splitlines()
-    assert "rename or uninstall it, then pip install --force-reinstall --no-deps birthsim" in said[-1]
+    assert "rename or uninstall it, then pip install --force-reinstall --no-deps -e . in a clone" in said[-1]
     assert ("nothing_of_the_kind" if content else str(tmp_path)) in said[-1]
     assert (done.returncode, len(said)) == (2, 1) if script == COMMAND else done.returncode != 0
 

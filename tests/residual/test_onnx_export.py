@@ -180,4 +180,4 @@ def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
     status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder)
     assert (status, printed, complaint.count("\n")) == (2, "", 1)
     assert missing in complaint
-    assert "extras agents and onnx: pip install 'birthsim[agents,onnx]'" in complaint
+    assert "extras agents and onnx: pip install -e '.[agents,onnx]'" in complaint

@@ -101,7 +101,7 @@ for name in ("SB3VecEnv", "load_policy", "export_onnx"):
 def test_a_name_that_needs_an_extra_says_which():
     done = subprocess.run([sys.executable, "-c", WITHOUT_EXTRAS], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == [
-        "SB3VecEnv needs pip install 'birthsim[agents]'",
-        "load_policy needs pip install 'birthsim[agents]'",
-        "export_onnx needs pip install 'birthsim[agents,onnx]'",
+        "SB3VecEnv needs pip install -e '.[agents]' in a clone",
+        "load_policy needs pip install -e '.[agents]' in a clone",
+        "export_onnx needs pip install -e '.[agents,onnx]' in a clone",
     ]

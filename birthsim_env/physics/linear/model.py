@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from birthsim_env.extras import installation
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
 
@@ -86,6 +87,6 @@ class LinearModel:
         try:
             import control
         except ImportError as error:
-            raise ImportError("to_control needs python-control: pip install 'birthsim[control]'") from error
+            raise ImportError(f"to_control needs python-control: {installation('control')}") from error
         names = {kind: [signal.name for signal in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
         return control.ss(self.A, self.B, self.C, self.D, **names)

@@ -183,5 +183,5 @@ def test_without_the_extra_it_says_how_to_get_it(suffix, package, files, tmp_pat
     line = ("--to", suffix[1:], files["recording"], "--out", tmp_path / f"a{suffix}")
     status, _, complained = call("export", monkeypatch, capsys, *line)
     assert status == 2
-    assert "pip install 'birthsim[log]'" in complained
+    assert "pip install -e '.[log]'" in complained
     assert list(tmp_path.iterdir()) == []
