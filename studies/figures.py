@@ -1,4 +1,4 @@
-"""A figure of a result by its name, so that prose can quote none that differs from it.
+"""A figure of a result by its name, so that a page of the site can quote none that differs from it: the role ``figure``.
 
 A name is a study and the way to the figure in ``results/STUDY.json``: ``worst:1/above``. In a table with columns and rows the
 way ends with cells that only one row has, and a column: ``circle:lab/admittance-adaptive/settled_rms/median``; nothing between

@@ -28,6 +28,7 @@ from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each, Listed
 from birthsim_env.physics.rig.values import in_line, shown
 from studies.tables import markdown
+from studies.worlds import worlds
 
 ENTRIES, TABLE = ROOT / "leaderboard", ROOT / "docs" / "data" / "leaderboard.md"
 RULES: dict[str, Any] = {"sensors": "lab", "randomize": "all", "episodes": 64, "seed": 80000}
@@ -168,7 +169,8 @@ def table() -> str:
     """The entries in Markdown, by environment and score, with the mean score of their episodes."""
     rows = [row(entry(path), path.stem) for path in entries()]
     head = ["environment", "entry", "controller", "score", "settled error, mm, median", "95th percentile", "lost of 64"]
-    return markdown([head, *(cells for _, _, cells in sorted(rows))]) + "\n"
+    said = f"{worlds(RULES['seed'], RULES['episodes'])}, the same for every entry."
+    return f"{said}\n\n{markdown([head, *(one for _, _, one in sorted(rows))])}\n"
 
 
 def row(said: dict[str, Any], name: str) -> tuple[str, float, list[str]]:

@@ -18,7 +18,6 @@ from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.values import shown
 from studies.door import OWN, STUDIES
-from studies.figures import figure
 from studies.results import changed, read_result
 from studies.study import Study
 
@@ -26,9 +25,10 @@ DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "paper.md")
 ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
 """Texts that do not stand in ``DATA``."""
 
-_QUOTED = re.compile(r"(<!-- figure ([^>]+) -->)(.*?)(<!-- end -->)")
 _PICTURE = re.compile(r"\]\((?:\.\./)*(\w+\.svg)\)")
-_MARKED = re.compile(r"(<!-- results of (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+_MARKED = re.compile(r"^<!-- results of (\w+) -->$.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)
+"""A table of a page: comments on lines of their own. A line that begins with a comment and goes on with text would be HTML to
+CommonMark, and its Markdown would stay raw, so there are no comments within lines."""
 
 
 def main() -> None:
@@ -89,8 +89,9 @@ def rendered() -> dict[Path, str]:
     found = {path: text for name in names() for path, text in texts(name)}
     tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
     for page in PAGES:
-        text = _MARKED.sub(lambda mark: f"{mark[1]}{tables[mark[2]]}{mark[4]}", page.read_text(encoding="utf-8"))
-        found[page] = _QUOTED.sub(lambda mark: f"{mark[1]}{figure(mark[2])}{mark[4]}", text)
+        found[page] = _MARKED.sub(
+            lambda mark: f"<!-- results of {mark[1]} -->\n\n{tables[mark[1]]}\n<!-- end -->", page.read_text(encoding="utf-8")
+        )
     return found
 
 
@@ -114,7 +115,7 @@ def draw() -> None:
 
 
 def renew() -> None:
-    """Run what is not fresh, each with its own defaults."""
+    """Run what is not fresh or was measured with other settings, each with its own defaults."""
     for name in names():
-        if not state(name).startswith("fresh"):
+        if state(name) != "fresh":
             subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True, cwd=ROOT)

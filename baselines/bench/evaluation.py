@@ -109,21 +109,28 @@ def evaluate_worlds(
     if arguments.get("device") is not None:
         said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
         raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]
-    result, law, first = Evaluation(name), controller_of(controller), 0
+    result, law = Evaluation(name), controller_of(controller)
     spent: list[float] = []
     try:
-        while first < len(seeds):
-            # Of four lanes (4, N) openings could be (N, 4) ones, and nobody would see it.
-            own = slice(first, first + (3 if min(LANES, len(seeds) - first) == 4 else LANES))
+        for own in batches(len(seeds)):
             lanes = None if rigs is None else rigs[:, own]
             _run_batch(environment, law, list(seeds[own]), lanes, arguments, result, spent, progress)
-            first = own.stop
     except KeyboardInterrupt:
         if not result.seeds:
             raise
         print(f"interrupted: {len(result.seeds)} of {len(seeds)} episodes are complete and kept")
     result.cost = float(np.median(spent))
     return result
+
+
+def batches(count: int) -> Iterator[slice]:
+    """Which of ``count`` episodes run side by side."""
+    first = 0
+    while first < count:
+        # Of four lanes (4, N) openings could be (N, 4) ones, and nobody would see it.
+        lanes = 3 if min(LANES, count - first) == 4 else min(LANES, count - first)
+        yield slice(first, first + lanes)
+        first += lanes
 
 
 def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:

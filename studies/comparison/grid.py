@@ -26,7 +26,9 @@ from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import shown
 from studies.comparison.paired import paired_ratios, summary_with_interval
+from studies.comparison.told import TOLD, can_be_told, evaluate_told
 
 ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 COMPARED = ("ideal", "lab")
@@ -128,9 +130,15 @@ def settings_of(name: str, rig: Parameters) -> dict[str, dict[str, Any]]:
     """Name -> settings of what is measured under a name: a controller's ``controller_settings``, or for "residual:POLICY" those
     of the policies of all its training seeds. ``ValueError`` for what is neither."""
     if not name.startswith(LEARNED):
-        return {name: {**controller_settings(name, rig), "policy": ""}}
+        plain, told = name.removeprefix(TOLD), name.startswith(TOLD)
+        own = controller_settings(plain, rig)
+        if told and not can_be_told(plain, rig):
+            raise ValueError(
+                f"controller = {shown(name)}; allowed: {TOLD} before a compiled controller without policy and limits"
+            )
+        return {name: {**own, "policy": "", "told": told}}
     folders = policy_folders(name.removeprefix(LEARNED))
-    own = {"controller": "residual", "rig": rig.to_dict()}
+    own = {"controller": "residual", "rig": rig.to_dict(), "told": False}
     return {
         f"{name} {place.name}": {**own, "source": file_hash(str(place / WEIGHTS)), "policy": _place(place)} for place in folders
     }
@@ -150,7 +158,7 @@ def as_described(rig: Parameters) -> Parameters:
 
 def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, seed: int) -> Task:
     """The task that computes one cell of a controller with its ``settings_of``."""
-    name = " ".join(filter(None, (settings["controller"], settings["policy"])))
+    name = " ".join(filter(None, (TOLD * settings["told"] + settings["controller"], settings["policy"])))
     where = {
         "environment": conditions.environment, "sensors": conditions.sensors, "plant": conditions.plant, "hand": conditions.hand
     }  # fmt: skip
@@ -159,15 +167,18 @@ def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, s
 
 
 def run_cell(
-    controller: str, source: str, policy: str, rig: dict[str, Any], environment: str, sensors: str, plant: str, hand: str,
-    episodes: int, seed: int,
+    controller: str, source: str, policy: str, told: bool, rig: dict[str, Any], environment: str, sensors: str, plant: str,
+    hand: str, episodes: int, seed: int,
 ) -> Result:  # fmt: skip
     """Values, returns and success per episode, lost ones and cost of one cell; ``source`` only tells different files apart."""
-    parameters = Parameters.from_dict(rig)
-    law = make_controller(controller, parameters, **({"policy": SHIPPED / policy} if policy else {}))
-    parameters = as_described(parameters) if plant == "described-sensors" else parameters
+    believed = Parameters.from_dict(rig)
+    parameters = as_described(believed) if plant == "described-sensors" else believed
     setting: Arguments = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
-    result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)
+    if told and PLANTS[plant] is True:
+        result = evaluate_told(environment, controller, parameters, range(seed, seed + episodes), setting)
+    else:
+        law = make_controller(controller, believed, **({"policy": SHIPPED / policy} if policy else {}))
+        result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)
     if len(result.seeds) < episodes:
         raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a cell is complete or it is none
     returns = {str(discount): values for discount, values in result.returns.items()}

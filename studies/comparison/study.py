@@ -25,6 +25,7 @@ from studies.comparison.grid import (
     settings_of,
     statistics,
 )
+from studies.comparison.headline import CONTROLLERS, headline, is_shown
 from studies.comparison.tables import (
     CIRCLE,
     FORCEPS,
@@ -41,6 +42,7 @@ from studies.comparison.tables import (
 )
 from studies.results import Content
 from studies.study import Found, Options, Study, no_pictures
+from studies.worlds import COUNT, SEED, worlds
 
 COLUMNS = ("environment", "sensors", "plant", "hand", "controller", "metric", *SUMMARY, *RATIO, "lost", "episodes")
 """Of the figures; ``SUMMARY`` is in the metric's unit."""
@@ -49,18 +51,37 @@ Key = tuple[str, Conditions, str]
 """What the figures call it, where it is measured, and which of its training seeds it is, if it was trained."""
 
 
-def cells(options: Options, wanted: Callable[[Conditions], bool] = lambda where: True) -> dict[Key, Task]:
+Wanted = Callable[[str, Conditions], bool]
+"""Whether a controller, by name, is measured under some conditions."""
+
+
+def anywhere(name: str, where: Conditions) -> bool:
+    """Every controller is, everywhere."""
+    return True
+
+
+def with_own_hand(name: str, where: Conditions) -> bool:
+    """Every controller is, where the hand is the environment's own."""
+    return not where.hand
+
+
+def cells(options: Options, wanted: Wanted = anywhere) -> dict[Key, Task]:
     """The pieces: every controller under all conditions that the options leave and that are ``wanted``."""
     rig = load_parameters(options.parameters or None)
-    conditions = [where for where in all_conditions(options.env, options.sensors, options.plant) if wanted(where)]
+    conditions = all_conditions(options.env, options.sensors, options.plant)
     if not conditions:
         raise ValueError(f"--plant {' '.join(options.plant)}; allowed: with --sensors honest, whose figures can be drawn")
     if "residual" in options.controller:
         raise ValueError(f"--controller 'residual'; allowed: {LEARNED}POLICY, a folder or one of {', '.join(shipped_names())}")
-    return {
+    found = {
         (name, where, member): cell_task(own, where, options.episodes, options.seed)
         for name in dict.fromkeys(options.controller) for member, own in settings_of(name, rig).items() for where in conditions
+        if wanted(name, where)
     }  # fmt: skip
+    if not found:
+        asked = f"--controller {' '.join(options.controller)} --sensors {' '.join(options.sensors)}"
+        raise ValueError(f"{asked}; allowed: a policy with the sensors that it was trained for")
+    return found
 
 
 def together(found: Found) -> dict[tuple[str, Conditions], Result]:
@@ -112,12 +133,16 @@ def tables(content: Content, name: str) -> dict[str, str]:
     figures, settings = figures_of(content), content["settings"]
     several = len({cell["environment"] for cell in figures}) > 1
     parts = [
-        f"{settings['episodes']} episodes per cell from seed {settings['seed']}, the same worlds for every controller. Medians "
-        "with 95 % bootstrap intervals; a lost episode counts as infinitely bad.",
+        f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad.",
         overview(figures), *([losses(figures)] if several else []),
         f"Every figure, with its interval, its worst episode and its ratio to the paper's law: [{name}.csv](data/{name}.csv)",
     ]  # fmt: skip
     return {f"{name}.md": "\n\n".join(parts) + "\n", f"{name}.csv": data(figures)}
+
+
+def measured_on(settings: dict[str, Any]) -> str:
+    """The worlds of a comparison, in a sentence."""
+    return f"{worlds(settings['seed'], settings['episodes'])}, the same for every controller."
 
 
 def _cuts(content: Content) -> dict[str, str]:
@@ -125,11 +150,23 @@ def _cuts(content: Content) -> dict[str, str]:
     figures = figures_of(content)
     where = {(CIRCLE, "randomised", sensors) for sensors in COMPARED}
     moving = [cell for cell in figures if (cell["environment"], cell["plant"], cell["sensors"]) in where]
-    return tables(content, "comparison") | ({"moving.md": overview(moving) + "\n"} if moving else {})
+    return tables(content, "comparison") | (
+        {"moving.md": f"{measured_on(content['settings'])}\n\n{overview(moving)}\n"} if moving else {}
+    )
 
 
 def _table_of(text: Callable[[Figures], str], name: str, content: Content) -> dict[str, str]:
-    return {f"{name}.md": text(figures_of(content)) + "\n"}
+    return {f"{name}.md": f"{measured_on(content['settings'])}\n\n{text(figures_of(content))}\n"}
+
+
+def _headline(content: Content) -> dict[str, str]:
+    said = (
+        "Settled error, mm: median [95 % interval]; a column for each kind of sensors. "
+        f"{measured_on(content['settings'])} Rigs are randomised, but for the first column. A lost or refused world counts as "
+        "infinitely bad. *Rig*: the controller believes the default one, or is told each. *Mass learned*: where it is less "
+        "than believed. Policies: five training seeds, with the sensors of their training."
+    )
+    return {"circle.md": f"{said}\n\n{headline(figures_of(content))}\n"}
 
 
 def pictures(content: Content, folder: Path) -> list[Path]:
@@ -143,7 +180,7 @@ def pictures(content: Content, folder: Path) -> list[Path]:
 
 def comparison(
     name: str, show: Callable[[Content], dict[str, str]] | None = None,
-    wanted: Callable[[Conditions], bool] = lambda where: True, draw: Callable[[Content, Path], list[Path]] = no_pictures,
+    wanted: Wanted = anywhere, draw: Callable[[Content, Path], list[Path]] = no_pictures,
     **options: Any,
 ) -> Study:  # fmt: skip
     """A study of some controllers under some conditions; ``options`` are defaults that differ from those of the comparison."""
@@ -152,12 +189,12 @@ def comparison(
         ("studies.comparison.grid", *(("agents.policy.controller",) if learned else ())),
         {
             "env": ENVIRONMENTS, "controller": tuple(default_controllers()), "sensors": ("ideal", "lab", "honest"),
-            "plant": tuple(PLANTS), "episodes": 100, "seed": 0, "parameters": "", **options,
+            "plant": tuple(PLANTS), "episodes": COUNT, "seed": SEED, "parameters": "", **options,
         },
         partial(cells, wanted=wanted), kept, METRICS, show or partial(tables, name=name), draw, partial=True,
         allowed={"env": ENVIRONMENTS, "sensors": tuple(SENSORS), "plant": tuple(PLANTS)},
         words={
-            "controller": "registered names, with options, path/to/file.py:Class, or residual:POLICY",
+            "controller": "registered names, with options, path/to/file.py:Class, residual:POLICY, told:NAME",
             "plant": "what differs from episode to episode beside the scenario", "parameters": "TOML file of the rig",
         },
     )  # fmt: skip
@@ -166,29 +203,28 @@ def comparison(
 COMPARISON = comparison("comparison", _cuts, draw=pictures)
 CIRCLES = comparison(
     "circle",
-    partial(_table_of, settled, "circle"), lambda where: not where.hand, env=(CIRCLE,), plant=("randomised",),
-    sensors=("ideal", "lab"), episodes=100, seed=60000,
-    controller=(
-        "backstepping", "pid", "admittance-backstepping", "admittance-adaptive", "residual:circle", "residual:circle_apg",
-    ),
-)  # fmt: skip
+    _headline,
+    is_shown,
+    env=(CIRCLE,),
+    controller=CONTROLLERS,
+    plant=("nominal", "randomised", "described-sensors"),
+)
 BOUNDED = comparison(
-    "bound", wanted=lambda where: not where.hand,
+    "bound", wanted=with_own_hand,
     env=(CIRCLE, PROBE), controller=("backstepping", "admittance-backstepping", "nonlinear-mpc"), sensors=("ideal", "lab"),
     plant=("nominal", "randomised"), episodes=8,
 )  # fmt: skip
 HONEST = comparison(
     "honest", partial(_table_of, by_sensors, "honest"), env=(CIRCLE, PROBE), plant=("randomised", "described-sensors"),
-    controller=("admittance-adaptive", "admittance-backstepping", "admittance-sensorless", "backstepping"), episodes=128,
-    seed=70000,
+    controller=("admittance-adaptive", "admittance-backstepping", "admittance-sensorless", "backstepping"),
 )  # fmt: skip
 LIMITED = comparison(
-    "limited", partial(_table_of, settled, "limited"), lambda where: not where.hand, env=(CIRCLE, FORCEPS),
-    plant=("randomised",), sensors=("lab", "honest"), episodes=100, seed=6_400_000,
+    "limited", partial(_table_of, settled, "limited"), with_own_hand, env=(CIRCLE, FORCEPS),
+    plant=("randomised",), sensors=("lab", "honest"),
     controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
 )  # fmt: skip
 ACCELERATION = comparison(
     "acceleration", partial(_table_of, by_sensors, "acceleration"), env=(CIRCLE, PROBE), sensors=("lab", "honest"),
-    plant=("randomised", "described-sensors"), controller=("admittance-adaptive", "admittance-sensorless"), episodes=128,
-    seed=70000, parameters="examples/acceleration_sensor_rig.toml",
+    plant=("randomised", "described-sensors"), controller=("admittance-adaptive", "admittance-sensorless"),
+    parameters="examples/acceleration_sensor_rig.toml",
 )  # fmt: skip

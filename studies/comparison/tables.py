@@ -120,7 +120,7 @@ def losses(figures: Figures) -> str:
 
 
 def settled(figures: Figures) -> str:
-    """Settled error by controller, environment and sensors: median and 95 %, and how many of the episodes were lost."""
+    """Settled error, mm, by controller, environment and sensors: median and 95 %, and how many of the episodes were lost."""
     kinds = list(dict.fromkeys((cell["environment"], cell["sensors"]) for cell in figures))
     several = len({environment for environment, _ in kinds}) > 1
     titles = [f"{_short(environment)}, " * several + f"{sensors} sensors" for environment, sensors in kinds]

@@ -21,6 +21,7 @@ from studies.results import Content
 from studies.sensorless.rigs import OFF, around
 from studies.study import Found, Options, Study
 from studies.tables import cells, markdown
+from studies.worlds import worlds
 
 RANGES = {
     "mechanics.mass": (1.0, 10.0), "air.supply_pressure": (5e5, 9e5),
@@ -116,7 +117,10 @@ def _shown(content: Content) -> dict[str, str]:
         beyond = [f"{shown[key]}; {own[key]['beyond']} of {own[key]['of']}" for key in METRICS]
         believes = f"its rig to {100 * OFF:g} %" if own["known"] else "the default rig"
         rows.append([f"`{own['controller']}`", believes, *beyond, shown["stiffness_error"]])
-    return {"wide_rigs.md": markdown(rows, rows[0][2:], alike=[row[1] for row in rows[1:]]) + "\n"}
+    drawn = worlds(content["settings"]["seed"], content["settings"]["episodes"])
+    said = f"{drawn}, of which those count that ask for at most {100 * STRENGTH:g} % of the rig's strength."
+    table = markdown(rows, rows[0][2:], alike=[row[1] for row in rows[1:]])
+    return {"wide_rigs.md": f"{said}\n\n{table}\n"}
 
 
 STUDY = Study(

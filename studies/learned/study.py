@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from studies.learned import felt
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.tables import cells, markdown, uses_force
+from studies.worlds import worlds
 
 
 class Run(NamedTuple):
@@ -128,14 +129,14 @@ def _summary(figures: dict[str, Any]) -> str:
     """Pooled errors of each scenario's policy beside its controllers."""
     head = ["scenario", "paper's law, mm", "controller underneath, mm", "with the residual, mm", "less than the paper's law, %"]
     lines = [head, ["---"] * len(head)]
-    for policy in ("circle", "probe", "forceps", "dystocia", "descent"):
-        if policy in figures:
-            own = {name: _row(found, "pooled RMS") for name, found in figures[policy]["beside"].items()}
-            paper, under = (own[name] for name in RUNS[policy].controllers)
-            less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
-            off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
-            lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    shown = [policy for policy in ("circle", "probe", "forceps", "dystocia", "descent") if policy in figures]
+    for policy in shown:
+        own = {name: _row(found, "pooled RMS") for name, found in figures[policy]["beside"].items()}
+        paper, under = (own[name] for name in RUNS[policy].controllers)
+        less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
+        off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
+        lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
+    return f"{_worlds(shown)}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
 def _beside(figures: dict[str, Any]) -> str:
@@ -153,7 +154,14 @@ def _beside(figures: dict[str, Any]) -> str:
             of, _, lost, *_ = own["lost episodes"]
             rows.append([world, name, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
             alike.append((policy, uses_force(name)))
-    return markdown(rows, rows[0][2:-1], alike=alike) + "\n"
+    return f"{_worlds(figures)}\n\n{markdown(rows, rows[0][2:-1], alike=alike)}\n"
+
+
+def _worlds(policies: Iterable[str]) -> str:
+    """The worlds of ``policies``, in a sentence."""
+    sets = dict.fromkeys((RUNS[policy].seed, RUNS[policy].episodes) for policy in policies)
+    named = {one: [policy for policy in policies if (RUNS[policy].seed, RUNS[policy].episodes) == one] for one in sets}
+    return " ".join(f"{worlds(*one)}: {', '.join(f'`{policy}`' for policy in own)}." for one, own in named.items())
 
 
 def _by_gradients(content: Content) -> dict[str, str]:

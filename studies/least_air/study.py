@@ -15,6 +15,7 @@ from studies.least_air.schedule import least_air
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.tables import markdown
+from studies.worlds import worlds
 
 PUSHES = {"circle": [(30.0, 0.0), (-30.0, 0.0), (0.0, 30.0), (0.0, -30.0)], "descent": [(80.0, 0.0)]}
 """N: the strongest pushes of the scenarios' hands."""
@@ -70,7 +71,8 @@ def _shown(content: Content) -> dict[str, str]:
             f"{median:.1f} ({low:.1f} to {high:.1f})", *(", ".join(map(number, one)) for one in row["error"]),
             ", ".join(map(str, row["lost"])),
         ])  # fmt: skip
-    return {"air.md": markdown(rows) + "\n"}
+    said = worlds(content["settings"]["seed"], content["settings"]["episodes"])
+    return {"air.md": f"{said}, randomised rigs on the scenario as described.\n\n{markdown(rows)}\n"}
 
 
 STUDY = Study(

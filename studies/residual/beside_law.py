@@ -28,6 +28,7 @@ from studies.haptics.worlds import Condition
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.tables import markdown
+from studies.worlds import worlds
 
 ERRORS = {"error": "settled error, mm", "stiffness": "error along the push, %"}
 STATIC = "static stiffness error, %: median", "95 %"
@@ -213,8 +214,8 @@ def _shown(content: Content) -> dict[str, str]:
         error, static = (map(_entry, row[name] or ("", "")) for name in ("error", "static"))
         rows.append([row["who"], *error, *less, _entry(row["stiffness"]), *static, _entry(row["lost"])])
     parts = [
-        f"{figures['within']} of {settings['episodes']} episodes, seeds from {settings['seed']}, `{settings['sensors']}` "
-        "sensors, randomised rigs, are within the rig's strength. Differences compare the same worlds, with 95 % intervals. "
+        f"{worlds(settings['seed'], settings['episodes'])}, `{settings['sensors']}` sensors, randomised rigs; "
+        f"{figures['within']} are within the rig's strength. Differences compare the same worlds, with 95 % intervals. "
         f"The static stiffness is that of a held push in as many worlds of `{PUSHED}`.",
         markdown(rows, [head[1], "95 %", rows[0][5], *STATIC]),
     ]

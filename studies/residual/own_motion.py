@@ -23,6 +23,7 @@ from studies.honest.sensor_floor import motion_floor, static_only
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.tables import markdown
+from studies.worlds import worlds
 
 HANDS = ("steps", "sine", "noise", "guided")
 PARTS = (0.5, 0.95, 1.0)
@@ -113,7 +114,7 @@ def _shown(content: Content) -> dict[str, str]:
     static = [["controller", "static stiffness error, %"]]
     static += [[name, " / ".join(map(number, sizes))] for name, sizes in figures["static"].items()]
     head = (
-        f"{settings['episodes']} circles from seed {settings['seed']}, `{settings['sensors']}` sensors, randomised rigs, those "
+        f"{worlds(settings['seed'], settings['episodes'])}, `{settings['sensors']}` sensors, randomised rigs, those "
         f"within the rig's strength. Differences compare the same worlds, with 95 % intervals. Below: `{STATIC}`."
     )
     moving = markdown(rows, rows[0][2:3], alike=[(hand, who in BOUNDS) for hand, who, *_ in rows[1:]])

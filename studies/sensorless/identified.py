@@ -44,7 +44,12 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     found, ranges = content["figures"], documented_ranges(as_described(Parameters()))
-    return {"identified.md": tables(found["felt"]) + "\n" + "\n".join(recovery_table(found["logs"], ranges)) + "\n"}
+    return {
+        "identified.md": tables(found["felt"], content["settings"])
+        + "\n"
+        + "\n".join(recovery_table(found["logs"], ranges))
+        + "\n"
+    }
 
 
 STUDY = Study(

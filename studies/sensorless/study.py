@@ -16,6 +16,7 @@ from studies.sensorless.measures import measure
 from studies.sensorless.rigs import PLANTS, believed
 from studies.study import Found, Options, Study
 from studies.tables import cells, markdown
+from studies.worlds import worlds
 
 RIGS = {
     "acceleration, no force": ("admittance-sensorless", "examples/acceleration_sensor_rig.toml"),
@@ -64,9 +65,9 @@ def kept(plants: Iterable[str], found: Found) -> Any:
     return jsonable(rows)
 
 
-def tables(figures: Any) -> str:
-    """What a hand feels, and errors by scenario."""
-    found = []
+def tables(figures: Any, settings: dict[str, Any]) -> str:
+    """What a hand feels, and errors by scenario, in the worlds of a result's ``settings``."""
+    found = [f"{worlds(settings['seed'], settings['episodes'])}, of every scenario."]
     for names, titles in ((COLUMNS, list(COLUMNS.values())), (SCENARIOS, [f"{name}: settled error, mm" for name in SCENARIOS])):
         rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
         for row in figures:
@@ -81,6 +82,6 @@ STUDY = Study(
     lambda options, found: kept(options.plant, found),
     {"stiffness_error": "%", "hunting": "mm", "clamped_mm": "mm", "clamped_N": "N", "overshoot": "mm",
      **dict.fromkeys(SCENARIOS, "mm"), "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
-    lambda content: {"sensorless.md": tables(content["figures"])}, allowed={"plant": PLANTS},
+    lambda content: {"sensorless.md": tables(content["figures"], content["settings"])}, allowed={"plant": PLANTS},
     words={"plant": "what the controller knows of the rig"},
 )  # fmt: skip

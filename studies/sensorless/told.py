@@ -1,6 +1,7 @@
 """A law that is told another rig in each lane."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,16 @@ class Told(StagedController):
         return Impedance(*(np.concatenate([getattr(one, name) for one in said], axis=2) for name in Impedance.__annotations__))
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        self._laws[0].explain(measurement, reference)
+        """Raise what the first law says that cannot serve its lane."""
+        for lane, law in enumerate(self._laws):
+            own = slice(lane, lane + 1)
+            said: dict[str, Any] = {
+                name: value[..., own] if isinstance(value, np.ndarray) else value for name, value in vars(measurement).items()
+            }
+            try:
+                law.explain(Measurement(**said), Reference(reference.rows[:, own]))
+            except ValueError as error:
+                raise ValueError(f"rig {lane}: {error}") from None
 
 
 def _abreast(columns: Sequence[Array]) -> Array:

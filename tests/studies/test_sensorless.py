@@ -40,3 +40,14 @@ def test_it_declares_what_each_law_declares():
     np.testing.assert_array_equal(
         told.declared_impedance(reference).damping[..., 1], laws[1].declared_impedance(reference).damping[..., 1]
     )
+
+
+def test_a_law_that_cannot_serve_its_lane_is_the_one_that_says_so():
+    light = {"mechanics.mass": 2.0, "valves.time_constant": 0.008}
+    told = Told([make_controller("backstepping", rig) for rig in (Parameters(), Parameters().replace(light))])
+    loop = RestingRigs([Parameters()] * 2, at_rest(2, stiffness=4000.0), told)
+    loop.close([])
+    with pytest.raises(
+        ValueError, match=r"rig 1: reference.stiffness = \(4000, 4000\) N/m in lane 0; allowed: at most 3\d\d\d N/m"
+    ):
+        loop.run(5)
