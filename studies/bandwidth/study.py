@@ -30,6 +30,10 @@ STIFFNESS = 2000.0
 BANDS = ((0.1, 0.95, 80.0, 1), (1.0, 20.0, 20.0, 2))
 """Hz from and to; s of a period, and periods that are measured. Two multisines, so that a line has a force worth feeling."""
 
+SINE, SINE_STEP, SINE_TIME = 20.0, 2, 2.0
+"""N of a hand that pushes with one sine at a time, which lines of the grid it takes, and s that it is measured at least, over
+two periods or more."""
+
 SETTLING = 5.0
 """s before the measured periods; assumed."""
 
@@ -44,6 +48,13 @@ RIGS = {
 }  # fmt: skip
 """Sensors by their name in the table -> sensor model, and the file of the rig that controllers believe. With ``KNOWN`` they are
 told each rig that is drawn, as after ``birthsim identify``."""
+
+WITH_SINES = (
+    ("admittance-adaptive", KNOWN),
+    ("admittance-sensorless", "honest, acceleration"),
+    ("admittance-sensorless", KNOWN),
+)
+"""Of ``MEASURED`` those that are also felt with one sine at a time."""
 
 MEASURED = (
     ("backstepping", "honest"), ("admittance-adaptive", "ideal"), ("admittance-adaptive", "honest"),
@@ -116,6 +127,22 @@ def measure(peak: float, known: bool, **settings: Any) -> Result:
 
     ``known``: the controller is told each rig that is drawn.
     """
+    pushes = []
+    for low, high, period, periods in BANDS:
+        own = lines(low, high, period)
+        pushes.append((own, hand_lines(peak, settings["seed"], own, period), period, periods))
+    return _measured_with(pushes, known, settings)
+
+
+def measure_sines(size: float, known: bool, **settings: Any) -> Result:
+    """The same under one sine of ``size`` N at a time."""
+    every = np.concatenate([lines(low, high, period) for low, high, period, _ in BANDS])[::SINE_STEP]
+    pushes = [(own, np.array([-1j * size]), 1 / own[0], max(2, round(SINE_TIME * own[0]))) for own in every[:, None]]
+    return _measured_with(pushes, known, settings)
+
+
+def _measured_with(pushes: list[tuple[Array, Complex, float, int]], known: bool, settings: dict[str, Any]) -> Result:
+    """What is felt under one push after another: its frequencies, amplitudes, period, and how many periods are measured."""
     condition = condition_of(**settings)
     rigs, direction, reference = _cases(condition)
     if known:
@@ -123,11 +150,9 @@ def measure(peak: float, known: bool, **settings: Any) -> Result:
     declared = declared_by(condition.law(), reference)
     if declared is None:
         raise ValueError(f"controller = {condition.controller!r}; allowed: one that declares an impedance")
-    frequency = np.concatenate([lines(low, high, period) for low, high, period, _ in BANDS])
+    frequency = np.concatenate([own for own, *_ in pushes])
     felt, lost = [], np.zeros(len(rigs), dtype=np.bool_)
-    for low, high, period, periods in BANDS:
-        own = lines(low, high, period)
-        force = hand_lines(peak, condition.seed, own, period)
+    for own, force, period, periods in pushes:
         found, gone = felt_impedance(condition, rigs, reference, direction, own, force, period, periods)
         felt.append(found)
         lost |= gone
@@ -151,23 +176,29 @@ def allowed(peak: float, **settings: Any) -> Result:
     return {"allowed": np.reshape(found, (len(DIRECTIONS), -1)).tolist()}
 
 
-def _settings(controller: str, sensors: str, peak: float, options: Options) -> dict[str, Any]:
+def _settings(controller: str, sensors: str, options: Options) -> dict[str, Any]:
     model, file = RIGS[sensors]
     own = controller_settings(controller, load_parameters(ROOT / file if file else None))
-    return {**own, "sensors": model, "seed": options.seed, "rigs": options.rigs, "force_sensor": True, "peak": peak}
+    return {**own, "sensors": model, "seed": options.seed, "rigs": options.rigs, "force_sensor": True}
 
 
-def _measured(controller: str, sensors: str, peak: float, options: Options) -> Task:
-    stem, settings = f"{file_stem(controller)}/{file_stem(sensors)}-{peak:g}", _settings(controller, sensors, peak, options)
-    return Task(stem, measure, {**settings, "known": sensors == KNOWN})
+def _pushes(options: Options) -> list[str]:
+    """How the table calls what the hand does: multisines by their peak, and one sine at a time."""
+    return [*(f"{peak:g} N" for peak in options.peak), f"one sine of {SINE:g} N"]
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
     found: dict[Any, Task] = {}
-    for peak in options.peak:
-        for controller, sensors in MEASURED:
-            found[controller, sensors, peak] = _measured(controller, sensors, peak, options)
-        found[peak] = Task(f"allowed/{peak:g}", allowed, _settings("admittance-adaptive", "ideal", peak, options))
+    *multisines, sine = _pushes(options)
+    for controller, sensors in MEASURED:
+        settings = {**_settings(controller, sensors, options), "known": sensors == KNOWN}
+        stem = f"{file_stem(controller)}/{file_stem(sensors)}"
+        for push, peak in zip(multisines, options.peak, strict=True):
+            found[controller, sensors, push] = Task(f"{stem}-{peak:g}", measure, {**settings, "peak": peak})
+        if (controller, sensors) in WITH_SINES:
+            found[controller, sensors, sine] = Task(f"{stem}-sine", measure_sines, {**settings, "size": SINE})
+    for push, peak in zip(multisines, options.peak, strict=True):
+        found[push] = Task(f"allowed/{peak:g}", allowed, {**_settings("admittance-adaptive", "ideal", options), "peak": peak})
     return found
 
 
@@ -180,27 +211,49 @@ def _summary(values: Any) -> list[float]:
 def _kept(options: Options, found: Found) -> Any:
     rows = [
         [
-            controller, sensors, f"{peak:g} N", axis,
-            *_summary(found[controller, sensors, peak]["bandwidth"][way]),
-            *_summary(found[controller, sensors, peak]["unnoticed"][way]),
-            *_summary(found[peak]["allowed"][way]), found[controller, sensors, peak]["lost"],
+            controller, sensors, push, axis,
+            *_summary(found[controller, sensors, push]["bandwidth"][way]),
+            *_summary(found[controller, sensors, push]["unnoticed"][way]),
+            *(_summary(found[push]["allowed"][way]) if push in found else [None] * 4), found[controller, sensors, push]["lost"],
         ]
-        for controller, sensors in MEASURED for peak in options.peak for way, axis in enumerate("xy")
+        for controller, sensors in MEASURED for push in _pushes(options) if (controller, sensors, push) in found
+        for way, axis in enumerate("xy")
     ]  # fmt: skip
-    return {"columns": COLUMNS, "rows": rows}
+    return {"columns": COLUMNS, "rows": rows, "lines": [_line(options.seed, *band) for band in BANDS]}
+
+
+def _line(seed: int, low: float, high: float, period: float, periods: int) -> list[float]:
+    """Of a multisine with a peak of 1 N: how many sines it has, Hz from and to, and the size of each, N."""
+    own = lines(low, high, period)
+    return [len(own), own[0], own[-1], unit_multisine(seed, own, period)[0]]
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "sensors", "push", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]]
+    rows = [
+        ["controller", "sensors", "what the hand does", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]
+    ]
     for row in content["figures"]["rows"]:
-        cells = ["{} [{}, {}]; {}".format(*map(number, row[first : first + 4])) for first in (4, 8, 12)]
-        rows.append([*row[:4], *cells, str(row[-1])])
+        cells = [
+            "-" if row[first] is None else "{} [{}, {}]; {}".format(*map(number, row[first : first + 4]))
+            for first in (4, 8, 12)
+        ]
+        push = row[2] if row[2].startswith("one") else f"multisines of {row[2]} at most"
+        rows.append([row[0], row[1], push, row[3], *cells, str(row[-1])])
     alike = [(*row[1:4], uses_force(row[0])) for row in rows[1:]]
-    return {"bandwidth.md": markdown(rows, most=rows[0][4:6], alike=alike) + "\n"}
+    return {"bandwidth.md": f"{_stimuli(content)}\n\n{markdown(rows, most=rows[0][4:6], alike=alike)}\n"}
+
+
+def _stimuli(content: Content) -> str:
+    """What the multisines are made of, in a sentence."""
+    parts, peaks = [], content["settings"]["peak"]
+    for count, low, high, size in content["figures"]["lines"]:
+        sizes = " or ".join(number(peak * size) for peak in peaks)
+        parts.append(f"{count} sines at once from {low:g} to {high:g} Hz, each of {sizes} N")
+    return f"A multisine of {' or '.join(f'{peak:g}' for peak in peaks)} N at most is {', and then '.join(parts)}."
 
 
 STUDY = Study(
     (__name__,), {"peak": (2.0, 10.0, 20.0), "rigs": 36, "seed": 7_300_000}, _tasks, _kept,
     {"bandwidth": "Hz", "unnoticed": "Hz", "allowed": "Hz"}, _shown,
-    words={"peak": "N, of the hand's force", "rigs": "randomised ones"},
+    words={"peak": "N that multisines of the hand reach", "rigs": "randomised ones"},
 )  # fmt: skip
