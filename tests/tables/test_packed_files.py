@@ -103,7 +103,7 @@ def test_fields_of_a_structure_units_of_metadata_and_what_parquet_cannot_say(tmp
 
 
 def mcap(path: Path, messages: list[tuple[str, Any]], encodings: dict[str, str] | None = None) -> Path:
-    writer = pytest.importorskip("mcap.writer", reason="mcap is not installed: pip install 'birthsim[log]'").Writer
+    writer = pytest.importorskip("mcap.writer", reason="mcap is not installed: pip install -e '.[log]'").Writer
     with path.open("wb") as file:
         log = writer(file)
         log.start()
