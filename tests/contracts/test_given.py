@@ -49,7 +49,7 @@ NUMBERS = {
     "stiffness": (lambda x: stepped(stiffness=x), 2000),
     "randomize": (lambda x: stepped(randomize={"mechanics.mass": (x, 5.0)}), 4),
     "amplitude": (lambda x: stepped(user_force=moving_hands.Sine(x)), 4),
-    "begins": (lambda x: stepped(user_force=user_forces.Ramp(begins=x)), 1),
+    "begins": (lambda x: stepped(user_force=user_forces.Ramp(begins=x), duration=4.0), 1),
     "radius": (lambda x: stepped(reference=birthsim_env.Circle(radius=(x, 0.05))), 0.0),
     "times": (
         lambda x: stepped(stiffness=birthsim_env.StiffnessSchedule((0.0, x), (2000.0,) * 2, (4600.0,) * 2, (2300.0,) * 2)),
