@@ -5,9 +5,9 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from birthsim_env.loop.rows import (
     Seen,
     fill_measurement,
     measurement_of,
+    signal_of,
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
@@ -32,6 +33,7 @@ from birthsim_env.parts.actuation import Forgetful
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, near, problem, shown
 from birthsim_env.restored import ANY, Declared
@@ -42,16 +44,12 @@ NO_ACTION = np.zeros(0, dtype=np.float32)
 
 def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measurement, Reference]:
     """Signals of one rig, which have no lane axis, as signals over one lane."""
-
-    def column(values: Array) -> Array:
-        return np.asarray(values, dtype=np.float64)[..., None]
-
-    m, acceleration = measurement, measurement.acceleration
-    seen = Measurement(
-        column(m.time), column(m.position), column(m.position_time), column(m.velocity), column(m.pressures),
-        column(m.user_force), m.sampled, None if acceleration is None else column(acceleration),
-    )  # fmt: skip
-    return seen, Reference(column(reference.rows))
+    names = ("time", "position", "position_time", "velocity", "pressures", "user_force", "acceleration")
+    signals = ((name, getattr(measurement, name)) for name in names)
+    columns: dict[str, Any] = {
+        name: signal_of(f"measurement.{name}", one)[..., None] for name, one in signals if one is not None
+    }
+    return replace(measurement, **columns), Reference(signal_of("reference.rows", reference.rows)[..., None])
 
 
 COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
@@ -61,12 +59,15 @@ COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
 def lanes_of(measurement: Measurement, reference: Reference) -> int:
     """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
     rows = {"position": 2, "velocity": 2, "pressures": 4, "user_force": 2, "acceleration": 2}
-    lanes = int(measurement.position.shape[1])
+    shape = shape_of(measurement.position)
+    if len(shape) != 2:
+        raise ValueError(f"measurement.position has shape {shape}; allowed: (2, N), or (2,) for one rig")
+    lanes = shape[1]
     signals = [(f"measurement.{name}", getattr(measurement, name), count) for name, count in rows.items()]
     for name, signal, count in (*signals, ("reference.rows", reference.rows, REFERENCES)):
-        if signal is not None and signal.shape != (count, lanes):
+        if (signal is not None or name != "measurement.acceleration") and shape_of(signal) != (count, lanes):
             raise ValueError(
-                f"{name} has shape {signal.shape}; allowed: {(count, lanes)}, with the lanes of measurement.position"
+                f"{name} has shape {shape_of(signal)}; allowed: {(count, lanes)}, with the lanes of measurement.position"
             )
     return lanes
 
@@ -75,19 +76,22 @@ def feedforward_rows(
     lanes: int, force: Array | None = None, rate: Array | None = None, factor: Array | None = None, *, taken: Sequence[str]
 ) -> Array:
     """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
-    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""
+    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, is no number as large as what is asked for may
+    be, and for what is not ``taken``."""
+    most = guard.MOST["reference"]
     given = np.zeros((5, lanes))
     for name, rows, one in zip(COMMAND_OPTIONS, (given[:2], given[2:4], given[4]), (force, rate, factor), strict=True):
         if one is not None:
             if name not in taken:
                 raise ValueError(f"{name} is given; allowed: {' and '.join(taken) or 'nothing'} besides the signals")
-            if np.shape(one) != rows.shape:
+            if shape_of(one) != rows.shape:
                 raise ValueError(
-                    f"{name} has shape {np.shape(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
+                    f"{name} has shape {shape_of(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
                 )
-            rows[:] = one
-            if not np.isfinite(rows).all():
-                raise ValueError(f"{name} has {rows[~np.isfinite(rows)][0]:g}; allowed: finite numbers")
+            rows[:] = signal_of(name, one)
+            wrong = ~(np.abs(rows) <= most)
+            if wrong.any():
+                raise ValueError(f"{name} has {rows[wrong][0]:g}; allowed: finite numbers, at most {most:g}")
     return given
 
 
@@ -256,8 +260,9 @@ class StagedController:
         acceleration is missing. What is measured and not finite is no error: see ``protect``, ``missed`` and ``ended``.
         """
         given = (feedforward_force, feedforward_rate, damping_factor)
-        if measurement.position.ndim == 1:
-            options = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
+        if len(shape_of(measurement.position)) == 1:
+            named = zip(COMMAND_OPTIONS, given, strict=True)
+            options = (None if one is None else signal_of(name, one)[..., None] for name, one in named)
             return self.command(*one_lane(measurement, reference), *options)[:, 0]
         if self.run_stages(measurement, reference, given):
             self.refuse(measurement, reference)
@@ -277,7 +282,7 @@ class StagedController:
             self._loop = MixedLoop(lanes, [], [*placed, *more], stages)
         self._asked[REFERENCES:] = feedforward_rows(lanes, *given, taken=self.COMMAND_OPTIONS)
         fill_measurement(self._seen, measurement)
-        self._seen[REFERENCE:] = reference.rows
+        self._seen[REFERENCE:] = signal_of("reference.rows", reference.rows)
         return self._loop.run()
 
     def good_signals(self) -> tuple[Measurement, Reference]:

@@ -39,6 +39,7 @@ from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
 from birthsim_env.restored import ANY, Declared
@@ -274,7 +275,7 @@ class PortLimiter(StagedController):
         """
         if self._stages is not None:
             return super().command(measurement, reference, *feedforward, **options)
-        if measurement.position.ndim == 1:
+        if len(shape_of(measurement.position)) == 1:
             options = {name: np.asarray(given)[..., None] for name, given in options.items()}
             return self.command(*one_lane(measurement, reference), **options)[:, 0]
         self._options = options

@@ -134,6 +134,6 @@ MACHINES: dict[str, Callable[[], Machine]] = {"host": Host, "cuda": Cuda}
 
 def machine_named(device: str) -> Machine:
     """The device of a name; ``ValueError`` for another name, and where something is missing."""
-    if device not in MACHINES:
+    if not isinstance(device, str) or device not in MACHINES:
         raise ValueError(f"device = {shown(device)}; allowed: None, {', '.join(map(repr, MACHINES))}")
     return MACHINES[device]()

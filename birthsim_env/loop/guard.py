@@ -6,7 +6,8 @@ last one at the openings. So the rule is the same for ``command``, for a user's 
 and in an FMU. Parts of the package say finite numbers; in a loop of these alone nothing has to be looked at:
 
 - A *signal* is what one sensor says: the clock, the position with its time, the velocity, the acceleration, the pressure of a
-  chamber, the hand's force; and what is asked for. It is *good* where all its numbers are finite and within ``Limits.most``.
+  chamber, the hand's force; and what is asked for. It is *good* where all its numbers are finite and within ``Limits.most``,
+  and where a position, measured or asked for, is not that of the pivot (``NEAREST``) and none of the future (``AHEAD``).
 - What is not good is replaced by the last good one, so that no memory of a controller takes it up. A late position keeps its
   time, because it is then no new sample.
 - Until each signal that the controller reads was good once, the valves stay closed.
@@ -34,7 +35,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 SIGNALS = ("time", "position", "velocity", "acceleration", "Pp1", "Pn1", "Pp2", "Pn2", "user_force", "reference")
 """Names of the signals."""
 
-_CLOCK, _ASKED = SIGNALS.index("time"), SIGNALS.index("reference")
+_CLOCK, _FIX, _ASKED = SIGNALS.index("time"), SIGNALS.index("position"), SIGNALS.index("reference")
 """The clock is also the first row of ``Signals``."""
 
 
@@ -56,6 +57,13 @@ MOST = {
 
 BEYOND = 10.0
 """So many times the reach of the rig, and its supply pressure, are still good; assumed."""
+
+NEAREST = 1e-3
+"""m from the pivot of cylinder 2, assumed: what is nearer is the zero of a tracker without its sensor. At the pivot no cylinder
+has a direction, so that a law would remember NaN."""
+
+AHEAD = 1.0
+"""s, assumed: a position may be so much later than the clock, where two clocks differ."""
 
 ON_FAULT = {"hold": 0.0, "vent": -1.0}
 """What the valves get once the control has ended: closed, or all chambers to the exhaust (a 5/3 valve cannot, and closes)."""
@@ -119,6 +127,12 @@ def _replace(signals: Array, bad: Array, kept: Kept, about: Limits, n: int) -> N
         kept.ended[i] = max(kept.ended[i], 1.0 if oldest > about.patience and oldest < np.inf else 0.0)
 
 
+@helper
+def _is_at_pivot(x: float, y: float) -> float:
+    """1 where a position, m, is nearer to the pivot than ``NEAREST``."""
+    return 1.0 if max(abs(x), abs(y)) < NEAREST else 0.0
+
+
 @kernel
 def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lane: int, n: int) -> int:
     """Replaces what is not good; returns how many lanes are asked for something that is not."""
@@ -137,6 +151,13 @@ def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lan
             # A comparison with what is not a number is false.
             beyond = 0.0 if abs(signals[k, i]) <= most else 1.0
             bad[signal, i], found.any[i] = max(bad[signal, i], beyond), max(found.any[i], beyond)
+    for i in range(n):
+        clock = kept.good[_CLOCK, i] if bad[_CLOCK, i] > 0.0 else seen.time[i]
+        beyond = 1.0 if seen.position_time[i] - clock > AHEAD else 0.0
+        beyond = max(beyond, _is_at_pivot(seen.position[0, i], seen.position[1, i]))
+        bad[_FIX, i], found.any[i] = max(bad[_FIX, i], beyond), max(found.any[i], beyond)
+        beyond = _is_at_pivot(seen.reference.position[0, i], seen.reference.position[1, i])
+        bad[_ASKED, i], found.any[i] = max(bad[_ASKED, i], beyond), max(found.any[i], beyond)
     some = 0.0
     for i in range(n):
         some = max(some, found.any[i])
@@ -206,4 +227,10 @@ def require_good(reference: Reference) -> None:
         raise ValueError(
             f"reference: {name} = {reference.rows[place, lane]:g} {unit} ({about}) in lane {lane}; "
             f"allowed: finite numbers, at most {MOST['reference']:g}"
+        )
+    pivot = np.abs(reference.position).max(axis=0) < NEAREST
+    if pivot.any():
+        raise ValueError(
+            f"reference: position is the pivot of cylinder 2 in lane {int(np.argmax(pivot))}; "
+            f"allowed: a position at least {NEAREST:g} m away"
         )

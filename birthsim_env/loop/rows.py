@@ -3,9 +3,13 @@
 ``World`` is the truth, for the plant and what acts on it; ``Seen`` is what a controller is handed.
 """
 
+from typing import Any
+
 from birthsim_env.loop.signals import Measurement, Point, Reference
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, STATE_NAMES, STATE_UNITS, Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
+from birthsim_env.physics.rig.arrays import floats_of, shape_of
+from birthsim_env.physics.rig.values import shown
 
 
 class World(Rows):
@@ -67,14 +71,29 @@ OPENING, SHOWN, HANDED, FAULT, SEEN = *(one.first for one in (Seen.opening, Seen
 """Numbers of rows, for arrays that a loop places."""
 
 
+def signal_of(name: str, value: Any) -> Array:
+    """A signal, or what a controller is given besides, as float64; ``ValueError`` that names it for anything but numbers."""
+    try:
+        return floats_of(value)
+    except ValueError as error:
+        raise ValueError(f"{name} = {shown(value)}: {error}; allowed: an array of numbers") from error
+
+
 def fill_measurement(rows: Array, measurement: Measurement) -> None:
-    """Write a measurement over N lanes into the rows of ``Signals``."""
-    seen = Signals(rows)
-    seen.time[:], seen.position_time[:] = measurement.time, measurement.position_time
-    seen.position[:], seen.velocity[:] = measurement.position, measurement.velocity
-    seen.pressure[:], seen.user_force[:] = measurement.pressures, measurement.user_force
-    if measurement.acceleration is not None:
-        seen.acceleration[:] = measurement.acceleration
+    """Write a measurement over N lanes into the rows of ``Signals``; ``ValueError`` for what are no numbers, by name."""
+    seen, m = Signals(rows), measurement
+    for name, own, value in (
+        ("time", seen.time, m.time), ("position", seen.position, m.position), ("velocity", seen.velocity, m.velocity),
+        ("position_time", seen.position_time, m.position_time), ("pressures", seen.pressure, m.pressures),
+        ("user_force", seen.user_force, m.user_force), ("acceleration", seen.acceleration, m.acceleration),
+    ):  # fmt: skip
+        if value is None and name == "acceleration":
+            continue
+        signal = signal_of(f"measurement.{name}", value)
+        try:
+            own[:] = signal
+        except ValueError:
+            raise ValueError(f"measurement.{name} has shape {shape_of(value)}; allowed: {own.shape}") from None
 
 
 def measurement_of(rows: Array, sampled: bool, has_acceleration: bool) -> Measurement:

@@ -24,7 +24,10 @@ CONTROLLERS = [
 ]  # fmt: skip
 SIGNALS = ("time", "position", "position_time", "velocity", "acceleration", "pressures", "user_force")
 VALUES = (math.nan, math.inf, -math.inf, 1e300)
+NO_PLACE = [("position", (0, 1), 0.0), ("position", (0, 1), 1e-4), ("position_time", 0, 1e9), ("position_time", 0, 5.0)]
+"""Finite, but no sample: the pivot, which a tracker without its sensor says, and times of the future."""
 CASES = [(signal, row, value) for signal in SIGNALS for row in (0, 1) for value in VALUES if row == 0 or "time" not in signal]
+CASES += NO_PLACE
 
 
 def world(sensors="ideal", lanes=1, rig=RIG, seed=5):
@@ -37,7 +40,7 @@ def world(sensors="ideal", lanes=1, rig=RIG, seed=5):
 def spoil(measured, lane, signal, row, value):
     array = getattr(measured, signal)
     if array is not None:
-        (array if array.ndim == 1 else array[row])[lane] = value
+        array[(lane,) if array.ndim == 1 else (row, lane)] = value
 
 
 def finite_memories(law):
@@ -178,12 +181,31 @@ def test_no_impedance_is_declared_for_setpoints_that_are_not_finite(name, row):
         make_controller(name, RIG).declared_impedance(wanted)
 
 
+@pytest.mark.parametrize("name", SERVING)
+def test_a_target_at_the_pivot_is_refused_and_leaves_no_trace(name):
+    """No cylinder has a direction there, and memories would keep a NaN."""
+    env, law, same = world(lanes=2), make_controller(name, RIG), make_controller(name, RIG)
+    for _ in range(3):
+        same.command(env.measurement, env.reference)
+    law.command(env.measurement, env.reference)
+    wrong = Reference(env.reference.rows.copy())
+    wrong.position[:, 1] = 0.0
+    with pytest.raises(ValueError, match=r"reference: position is the pivot .* in lane 1; allowed: a position at least"):
+        law.command(env.measurement, wrong)
+    law.command(env.measurement, env.reference)
+    assert (finite_memories(law) == finite_memories(same)).all()
+    env.close()
+
+
 def test_forces_to_believe_in_are_finite():
     law, wanted = make_controller("backstepping", RIG), closed_loop.holding(np.array([[0.5], [0.0]]), 2000.0)
     measured = closed_loop.ideal(closed_loop.resting_at(wanted, RIG), 0.0, np.zeros((2, 1)))
     for option, shape in (("feedforward_force", (2, 1)), ("feedforward_rate", (2, 1)), ("damping_factor", (1,))):
         with pytest.raises(ValueError, match=rf"{option} has nan; allowed: finite"):
             law.command(measured, wanted, **{option: np.full(shape, math.nan)})
+        for huge in (1e13, 1e300, -1e300):
+            with pytest.raises(ValueError, match=rf"{option} has .*; allowed: finite numbers, at most 1e\+12"):
+                law.command(measured, wanted, **{option: np.full(shape, huge)})
 
 
 def test_a_policy_that_is_a_function_sees_the_last_good_sample():

@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from dataclasses import asdict
+from dataclasses import asdict, fields, replace
 from decimal import Decimal
 from fractions import Fraction
 
@@ -18,8 +18,9 @@ from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration
 from baselines import evaluate
 from baselines.registry import controller_names, known_options, make_controller
-from birthsim_env import Parameters
+from birthsim_env import Measurement, Parameters, Reference
 from birthsim_env.parts.hands import contractions, moving_hands, user_forces
+from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import checked_count, checked_number, whole_of
@@ -76,7 +77,8 @@ COUNTS = {
     "hidden": (lambda n: TrainingSettings(hidden=(n,)).hidden, 8),
     "random-valves": (lambda n: make_controller("random-valves", Parameters(), seed=n)._seed, 3),
 }
-NO_NUMBERS = (True, np.True_, "4", Fraction(4), Decimal(4), np.array(4.0), 4 + 0j, None, [4.0], np.nan)
+DURATIONS = (np.timedelta64(4, "s"), np.timedelta64(4))
+NO_NUMBERS = (True, np.True_, "4", *DURATIONS, Fraction(4), Decimal(4), np.array(4.0), 4 + 0j, None, [4.0], np.nan)
 
 
 @pytest.mark.parametrize("name", NUMBERS)
@@ -118,6 +120,12 @@ def test_what_is_kept_is_pythons():
     same = make_controller("admittance", Parameters(), lead_time=float(np.float32(0.001)))
     same.prepare(1, False)
     np.testing.assert_array_equal(law._made[-1].constants, same._made[-1].constants)
+
+
+def test_a_device_is_a_name():
+    for wrong in (["cuda"], {}, np.array("cuda"), 3, "gpu"):
+        with pytest.raises(ValueError, match=r"device = .*; allowed: None, "):
+            stepped(device=wrong)
 
 
 @pytest.mark.parametrize("flag", ["force_sensor", "clip_actions", "randomize"])
@@ -219,6 +227,44 @@ def test_what_would_become_numbers_in_silence_is_refused_with_its_cause(kind):
         assert name.strip() in str(caught.value)
         if name not in ("options", "reference.sample"):
             assert kind.replace("_", " ").partition(" ")[0] in str(caught.value), name
+
+
+@pytest.mark.parametrize("kind", _arrays((1,)))
+@pytest.mark.parametrize("lanes", [(), (2,)])
+def test_a_controller_is_handed_numbers(kind, lanes):
+    """Measured by a sensor of a user's own, asked for, or to be believed in."""
+    law, shapes = make_controller("admittance", Parameters()), {"time": (), "position_time": (), "pressures": (4,)}
+    names = [one.name for one in fields(Measurement) if one.name != "sampled"]
+    good = {name: np.full((*shapes.get(name, (2,)), *lanes), 0.5) for name in names}
+    wanted = Reference(np.full((15, *lanes), 2000.0))
+    odd = {name: _arrays((*shapes.get(name, (2,)), *lanes) or (1,))[kind] for name in names}
+    for name in names:
+        with pytest.raises(ValueError, match=rf"measurement\.{name} .*; allowed: "):
+            law.command(Measurement(**{**good, name: odd[name]}, sampled=False), wanted)
+    seen = Measurement(**good, sampled=False)
+    with pytest.raises(ValueError, match=r"reference\.rows .*; allowed: "):
+        law.command(seen, Reference(_arrays((15, *lanes))[kind]))
+    with pytest.raises(ValueError, match=r"feedforward_force .*; allowed: "):
+        law.command(seen, wanted, feedforward_force=_arrays((2, *lanes))[kind])
+
+
+class Sensors(IdealSensors):
+    """A user's own, of which one signal is odd."""
+
+    name, odd = "position", None
+
+    def measure(self, *given):
+        return replace(super().measure(*given), **{self.name: self.odd})
+
+
+@pytest.mark.parametrize("kind", _arrays((1,)))
+def test_sensors_of_ones_own_tell_numbers(kind, monkeypatch):
+    monkeypatch.setitem(SENSORS, "own", Sensors)
+    for name, shape in (("time", (2,)), ("position", (2, 2)), ("pressures", (4, 2)), ("acceleration", (2, 2))):
+        monkeypatch.setattr(Sensors, "name", name)
+        monkeypatch.setattr(Sensors, "odd", _arrays(shape)[kind])
+        with pytest.raises(ValueError, match=rf"measurement\.{name} = .*; allowed: an array of numbers"):
+            stepped(sensors="own")
 
 
 def test_arrays_of_numbers_are_taken_whatever_made_them():

@@ -20,6 +20,8 @@ def floats_of(value: Any, arrays: Any = np) -> NDArray[np.float64]:
     Raises ``ValueError`` that says why not: for what is no array of numbers, and for masked entries, complex numbers, text, and
     True and False, which would become numbers in silence.
     """
+    if type(value) is np.ndarray and value.dtype == np.float64 and arrays is np:
+        return value
     try:
         masked = _is_masked(value)
         array = None if masked else arrays.asarray(value)

@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from numbers import Integral, Rational, Real
 from typing import Any
 
+import numpy as np
+
 LONGEST = 160
 """Characters of a value in an error; a longer one is cut."""
 
@@ -55,7 +57,8 @@ def problem(error: BaseException) -> str:
 
 def number_of(value: Any) -> int | float | None:
     """``value`` as a number of Python's, or None where it is no number."""
-    if isinstance(value, bool):
+    # A duration of NumPy's calls itself a whole number.
+    if isinstance(value, (bool, np.timedelta64)):
         return None
     if isinstance(value, Integral):
         return int(value)
