@@ -19,6 +19,7 @@ from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.loop.world import no_force_stage
 from birthsim_env.observation import observe
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import shown
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
 """Actions (N, ``settings.size``) in [-1, 1] for observations (N, D), which ``observation_names(settings)`` describes.
@@ -50,7 +51,7 @@ class ResidualController(ResidualLaw):
         elif settings is None:
             self._network, settings = _stored(policy)
         else:
-            raise ValueError(f"settings = {settings!r} beside policy = {str(policy)!r}; allowed: beside a function")
+            raise ValueError(f"settings = {shown(settings)} beside policy = {shown(policy)}; allowed: beside a function")
         super().__init__(rig, settings)
         self._periods = policy_periods(settings.policy_period, rig)
         self._calls = 0
