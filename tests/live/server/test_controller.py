@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from birthsim_env.loop.rows import ASKED, OPENING, WORLD
+from birthsim_env.loop.rows import ASKED, OPENING, WORLD, Signals
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import offer, packed_page
 from studies.targets.reference import whole_rows
@@ -66,7 +66,13 @@ GOES_ON = []
 
 
 def numbers(rows=None, sampled=False):
-    return np.concatenate([[float(sampled)], np.zeros(ASKED) if rows is None else rows]).tobytes()
+    """What the page sends: a head at rest on its target, which 2000 N/m hold, where no rows are given."""
+    if rows is None:
+        signals = Signals(np.zeros(ASKED))
+        signals.position[0] = signals.reference.position[0] = 0.5
+        signals.reference.stiffness[:], signals.pressure[:] = 2000.0, 3e5
+        rows = signals.rows
+    return np.concatenate([[float(sampled)], rows]).tobytes()
 
 
 @pytest.fixture
