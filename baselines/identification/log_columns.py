@@ -98,4 +98,10 @@ def _forces(chosen: Selection, mapping: dict[str, str], recorded: Iterable[str])
             f"{source} lacks {', '.join(FORCES)}, but {in_line(', '.join(like))} may be a force; allowed: --columns "
             f"force_x=COLUMN,force_y=COLUMN, or force_x={NOTHING},force_y={NOTHING} where nobody touches the rig"
         )
+    apart = [name for name in chosen.table.elsewhere if is_like_force(name, "")]
+    if apart:
+        raise ValueError(
+            f"{source} lacks {', '.join(FORCES)}, but {in_line(', '.join(apart))}, which is not read, may be a force; allowed: "
+            f"all columns in one channel, or --columns force_x={NOTHING},force_y={NOTHING} where nobody touches the rig"
+        )
     return np.array([none, none]), f"{source} has no force; it is taken as 0, as where nobody touches the rig"

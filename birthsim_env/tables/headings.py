@@ -62,19 +62,20 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     return text, word if len(word) > 1 and not is_known(apart[1]) else ""
 
 
-def is_units(cells: list[str]) -> bool:
-    """Whether a line of cells is a row of units: most of its words are known ones, and none is a name."""
+def is_units(cells: list[str], below: bool = False) -> bool:
+    """Whether a line of cells is a row of units: most of its words are known ones, and none is a name. ``below`` a heading of
+    known names one of them is enough: the others are units that are not known, which must not be taken for SI."""
     words = [word for cell in cells if (word := _bare(cell)) not in ("", "-")]
     known = [unit_of(word) is not None for word in words]
     named = [is_known(word) and not known[k] for k, word in enumerate(words)]
-    return sum(known) > len(words) / 2 and not any(named)
+    return sum(known) > (0 if below else len(words) / 2) and not any(named)
 
 
 def _bare(cell: str) -> str:
     """What a cell of a row of units says, without brackets; nothing where it says that this is a row of units."""
     cell = cell.strip()
     cell = cell[1:-1].strip() if len(cell) > 1 and cell[0] + cell[-1] in ("()", "[]", "{}") else cell
-    return "" if key(cell) in ("unit", "units") else cell
+    return "" if key(cell) in ("unit", "units", "na", "none") else cell
 
 
 def units_of(cells: list[str]) -> list[str]:
@@ -82,14 +83,25 @@ def units_of(cells: list[str]) -> list[str]:
     return [_bare(cell) for cell in cells]
 
 
+_GIVERS = frozenset(
+    ("hand", "user", "operator", "ext", "load", "push", "pull", "grip", "tension", "effort", "interaction", "ati")
+)
+"""Words that before an axis hardly mean anything but a force."""
+
+
 def is_like_force(name: str, unit: str) -> bool:
     """Whether a column looks like a force, by its name or unit."""
     found = unit_of(unit)
     if found is not None and found[0] == "N":
         return True
-    words = re.split(r"[^a-zA-Z0-9]+|(?<=[a-z])(?=[A-Z])", name)
+    words = [word for word in re.split(r"[^a-zA-Z0-9]+|(?<=[a-z])(?=[A-Z])", name) if word]
+    folded = [word.casefold() for word in words]
+    axes = len(words) > 1 and re.fullmatch(r"[a-z]?[xyz]|[0-2]", folded[-1])
     return bool(
-        re.search(r"force|frc|kraft|wrench|loadcell|newton", key(name))
+        re.search(r"force|frc|kraft|fuerza|wrench|loadcell|ftsensor|newton|lbf|kgf", key(name))
         or re.fullmatch(r"(?i)f([ _.]?(hand|user|ext|meas|load)|[ _.]?[xyzabt12]([ _.].*)?)?", name)
-        or any(re.fullmatch(r"(?i)f[txyz]", word) for word in words)
+        or any(re.fullmatch(r"f[ehu]?[txyz][0-9]?", word) for word in folded)
+        or folded == ["hand"]
+        or (axes and (folded[0] in ("f", "fe", "fh", "fu") or folded[-2] in _GIVERS))
+        or (len(words) > 1 and words[-1] == "N")
     )

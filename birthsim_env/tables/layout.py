@@ -119,7 +119,11 @@ def _heading(rows: list[_Line], how: Reading) -> tuple[_Line | None, _Line | Non
             units = next((line for line in above if is_units(line.cells)), None)
             headings = [line for line in above if line is not units and (not line.is_remark or _known(line, how))]
             if headings:
-                return next((line for line in headings if _known(line, how)), headings[0]), units, row.number - 1
+                names = next((line for line in headings if _known(line, how)), headings[0])
+                if units is None and _known(names, how):
+                    below = (line for line in above if line.number > names.number)
+                    units = next((line for line in below if is_units(line.cells, below=True)), None)
+                return names, units, row.number - 1
             break
     worded = [row for row in rows if not _has_number(row, how)]
     heading = next((row for row in worded if _known(row, how) > 1), None)

@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,9 @@ def read_mcap(source: str, content: bytes, how: Reading) -> Table:
         raise ValueError(f"{source} {words}; allowed: messages in JSON")
     name = max(topics, key=lambda one: (topics[one].known(how), len(topics[one].times)))
     others = in_line(", ".join(sorted({*topics, *foreign} - {name})))
-    return table_of(source, topics[name].raw(), [f"{source}: {name} is read; not read: {others}"] if others else [])
+    found = table_of(source, topics[name].raw(), [f"{source}: {name} is read; not read: {others}"] if others else [])
+    parts = (f"{other}.{column}" for other, one in topics.items() if other != name for column in one.names())
+    return replace(found, elsewhere=(*sorted(foreign), *parts))
 
 
 class _Size:
@@ -59,9 +62,13 @@ class _Topic:
         self._cells: dict[str, Cells] = {}
         self._faults: dict[str, str] = {}
 
+    def names(self) -> list[str]:
+        """The columns, without their units."""
+        return [name_and_unit(name)[0] for name in self._columns]
+
     def known(self, how: Reading) -> int:
         """How many columns somebody may want."""
-        return sum(how.asks_for(name_and_unit(name)[0]) for name in self._columns)
+        return sum(map(how.asks_for, self.names()))
 
     def take(self, time: int, message: Any, size: _Size) -> None:
         row = len(self.times)

@@ -53,7 +53,8 @@ class _Column:
     """Numbers of a field (T,), part by part."""
 
     def __init__(self, field: Any, count: int) -> None:
-        said = (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
+        about = {name.lower(): words for name, words in (field.metadata or {}).items()}
+        said = about.get(b"unit", about.get(b"units", b"")).decode(errors="replace")
         self._type, self._values, self._cells = field.type, np.full(count, np.nan), Cells()
         self._unit, self._fault = "" if said == "1" else said, ""
         self._first: int | None = None

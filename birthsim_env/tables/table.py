@@ -58,7 +58,7 @@ class Table:
     ``source`` names the file in errors; ``units`` are those that it states; ``headings`` are the names with all around them.
     ``faults``: name -> why a column cannot be used. ``clocks`` are columns of instants, in s from the first one on.
     ``lines`` are the lines of the rows in a file of text. Without a heading (``headed``) names are ``column 1`` and so on.
-    ``notes`` say what was left out of the file.
+    ``notes`` say what was left out of the file; ``elsewhere`` are names of what it holds that is no part of the table.
     """
 
     source: str
@@ -70,6 +70,7 @@ class Table:
     lines: Array | None = None
     headed: bool = True
     notes: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:

@@ -6,7 +6,7 @@ from array import array
 import numpy as np
 
 from birthsim_env.physics.rig.values import in_line, problem, shown
-from birthsim_env.tables.cells import Cells
+from birthsim_env.tables.cells import Cells, is_missing, is_number, why
 from birthsim_env.tables.encoding import encoding_and_note, lines_of
 from birthsim_env.tables.layout import Layout, is_remark, layout_of, split, trimmed
 from birthsim_env.tables.table import Raw, Reading, Table, table_of
@@ -80,7 +80,10 @@ class _Rows:
             words += f", for {in_line(', '.join(self._names))} (line {self._layout.heading})"
         if self._how.has_options:
             words += ", or --skip LINES where the heading is another line"
-        raise ValueError(f"{self._source}, line {number}: {shown(line.rstrip())}; allowed: {words}")
+        cells = split(line, self._layout.separator)
+        odd = next((cell for cell in cells if not (is_missing(cell) or is_number(cell, self._how.decimal_comma))), "")
+        cause = f"; of {shown(odd[:60])}{said.replace('; ', ': ', 1)}" if (said := why(odd, self._how)) else ""
+        raise ValueError(f"{self._source}, line {number}: {shown(line.rstrip())}; allowed: {words}{cause}")
 
     def table(self, notes: list[str]) -> Table:
         """All rows that were taken."""

@@ -8,6 +8,7 @@ UNITS: dict[str, tuple[str, float]] = {
     **{"m": ("m", 1.0), "cm": ("m", 1e-2), "mm": ("m", 1e-3), "um": ("m", 1e-6)},
     **dict.fromkeys(("meter", "meters", "metre", "metres"), ("m", 1.0)),
     **{"N": ("N", 1.0), "mN": ("N", 1e-3), "kN": ("N", 1e3), "MN": ("N", 1e6)},
+    **{"daN": ("N", 10.0), "kgf": ("N", 9.80665), "lbf": ("N", 4.4482216152605)},
     **dict.fromkeys(("newton", "newtons"), ("N", 1.0)),
     **{"mPa": ("Pa", 1e-3), "Pa": ("Pa", 1.0), "hPa": ("Pa", 1e2), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6)},
     **{"mbar": ("Pa", 1e2), "bar": ("Pa", 1e5), "psi": ("Pa", 6894.757293168)},

@@ -8,6 +8,7 @@ import pytest
 
 from baselines.identification.log_columns import COLUMNS, LogOptions, read_columns
 from birthsim_env.physics.compiled.lanes import Array
+from tests.tables.test_packed_files import mcap
 
 ROWS = 5
 FORCES = {"force_x": 7.0, "force_y": -3.0}
@@ -47,6 +48,8 @@ LIKE = [
     *(("Fz", "Ft"), ("Fx_filt", "Fy_filt"), ("frc_x", "frc_y"), ("force_1", "force_2"), ("force", "foo"), ("Kraft_x", "q")),
     *(("load_x [N]", "load_y [N]"), ("loadCell1", "q"), ("wrench.x", "wrench.y"), ("ATI_Fx", "ATI_Fy"), ("fx raw (kg)", "q")),
     *(("FT_x", "FT_y"), ("scenario_force_x", "q"), ("F [N]", "q"), ("F", "q")),
+    *(("F_hand_x", "F_hand_y"), ("F_hx", "F_hy"), ("Fh_x", "Fh_y"), ("fhx", "fhy"), ("FX1", "FY1"), ("load_x", "load_y")),
+    *(("hand_x", "hand_y"), ("hand", "q"), ("tensionX", "tensionY"), ("effort_x_N", "q"), ("aN", "bN"), ("ftsensor", "q")),
 ]
 
 
@@ -125,6 +128,22 @@ def test_one_mapped_axis_the_other_without_a_force(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="not used: q"):
         found = read(tmp_path, content({"force_x": "Fz", "force_y": "q"}), columns="force_x=Fz,force_y=none")
     assert (found["force_x"][0], found["force_y"][0]) == (7.0, 0.0)
+
+
+def test_a_force_in_another_channel_is_not_left_out(tmp_path: Path) -> None:
+    rows = {name: float(column[0]) for name, column in content().items() if name not in FORCES}
+    path = mcap(tmp_path / "own.mcap", [("/rig", rows), ("/hand", {"x": 7.0, "y": -3.0}), ("/imu", {"a": 1})])
+    with pytest.raises(ValueError, match=r"but /hand.x, /hand.y, which is not read, may be a force; allowed: all columns"):
+        read_columns(path, LogOptions())
+    with pytest.warns(UserWarning, match="not read: /hand, /imu"):
+        assert not read_columns(path, LogOptions(columns="force_x=none,force_y=none"))[1]["force_x"].any()
+
+
+def test_units_that_are_not_known_are_not_taken_for_newtons(tmp_path: Path) -> None:
+    lines = [",".join(COLUMNS), "s,,,,,Pa(a),Pa(a),Pa(a),Pa(a),m,m,ozf,ozf", *[",".join("1" * len(COLUMNS))] * 2]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"has 'pressures_P1' in Pa\(a\); allowed: absolute pressures in "):
+        read_columns(tmp_path / "log.csv", LogOptions())
 
 
 def test_a_log_needs_a_heading(tmp_path: Path) -> None:

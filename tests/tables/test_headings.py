@@ -42,6 +42,7 @@ def test_a_heading_is_a_name_and_a_unit(heading: str) -> None:
     ("word", "si"),
     [
         *(("ms", ("s", 1e-3)), ("MS", ("s", 1e-3)), ("\u00b5s", ("s", 1e-6)), ("\u03bcs", ("s", 1e-6)), ("Sec", ("s", 1.0))),
+        *(("lbf", ("N", 4.4482216152605)), ("kgf", ("N", 9.80665)), ("daN", ("N", 10.0))),
         *(("mN", ("N", 1e-3)), ("MN", ("N", 1e6)), ("KN", ("N", 1e3)), ("Mn", None), ("mPa", ("Pa", 1e-3))),
         *(
             ("MPa", ("Pa", 1e6)),
@@ -59,7 +60,11 @@ def test_units_in_any_case_unless_they_could_be_two(word: str, si: tuple[str, fl
 
 
 @pytest.mark.parametrize(
-    "name", ["temperature", "voltage", "valve_feedback", "fs", "flow", "offset", "factor", "file", "Foot", "x_f"]
+    "name",
+    [
+        *("temperature", "voltage", "valve_feedback", "fs", "flow", "offset", "factor", "file", "Foot", "x_f", "fft"),
+        *("hand_position_x", "f_max"),
+    ],
 )
 def test_what_is_like_no_force(name: str) -> None:
     assert not is_like_force(name, "")

@@ -83,6 +83,14 @@ def test_columns_of_parquet(kind: str, tmp_path: Path) -> None:
     same(read_table(tmp_path / "own.Parquet"))
 
 
+@pytest.mark.parametrize("word", ["unit", "units", "Unit"])
+def test_units_of_fields_of_parquet(word: str, tmp_path: Path) -> None:
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    milli = pa.field("time", pa.float64(), metadata={word: "ms"})
+    pq.write_table(pa.table([1e3 * TIMES, VALUES], pa.schema([milli, ("force_x", pa.float64())])), tmp_path / "own.parquet")
+    same(read_table(tmp_path / "own.parquet"))
+
+
 def test_fields_of_a_structure_units_of_metadata_and_what_parquet_cannot_say(tmp_path: Path) -> None:
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     inside = pa.array([{"x": value, "y": 1.0} for value in VALUES])

@@ -170,6 +170,8 @@ REFUSED: dict[str, tuple[str | bytes, str]] = {
     "too many cells": ("time,x,y\n0,1,0\n1,1,1,1\n2,2,2\n", "line 3: '1,1,1,1'; allowed: 3 numbers"),
     "a foot": (PLAIN + "End of file\n", "line 6: 'End of file'; allowed: 3 numbers"),
     "an open quote": ('time,x,y\n0,"1,0\n1,1,1\n', "line 2: .*allowed: 3 numbers"),
+    "units, one of them unknown": ("time,x,y\nms,furlong,furlong\n0,1,0\n1,1,1\n", "'x' in furlong; allowed: m, cm, mm"),
+    "decimal commas, a cell too few": ("time;x;y;z\n0,0;0,5;0,1\n", "of '0,0': it has a decimal comma, allowed: a decimal"),
     "twice": ("time,x,x,y\n0,1,1,0\n1,1,1,1\n", "column 'x': is there more than once; allowed: one"),
     "either of two": (
         "time,pos_x,position_x_m,px,y\n0,1,2,1,0\n1,1,1,1,1\n",
