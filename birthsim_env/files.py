@@ -102,10 +102,13 @@ def whole_folder(folder: Path, name: str) -> Iterator[Path]:
 
 
 def _join(own: Path, folder: Path) -> None:
-    """Rename the files of a folder into another one; folders stay where they are."""
-    for path in sorted(own.iterdir()):
-        if path.is_file():
-            path.replace(folder / path.name)
+    """Rename the files of a folder into another one, all or, where a folder has the name of one, none; folders stay."""
+    steps = [(path, folder / path.name) for path in sorted(own.iterdir()) if path.is_file()]
+    for _, there in steps:
+        if there.is_dir() and not there.is_symlink():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(there))
+    for path, there in steps:
+        path.replace(there)
 
 
 @contextmanager
