@@ -1,6 +1,7 @@
 """How a command runs: its settings are read, signals are answered, and what a user can mend ends it in one line."""
 
 import os
+import re
 import signal
 import sys
 import warnings
@@ -116,9 +117,14 @@ def act(name: str, action: Callable[[], None]) -> None:
 def _warn(name: str, before: Callable[..., None], message: Warning | str, category: type[Warning], *where: Any) -> None:
     """What a user should know in one line, as errors are, without the line of source code; other warnings as they come."""
     if category is UserWarning:
-        print(f"{name}: warning: {message}", file=sys.stderr)
+        print(f"{name}: warning: {_short(str(message))}", file=sys.stderr)
     else:
         before(message, category, *where)
+
+
+def _short(words: str) -> str:
+    """``words`` without the middle of what a user gave that is longer than any name; a message may say it twice."""
+    return re.sub(r"\S{301,}", lambda run: f"{run[0][:120]} ... {run[0][-120:]}", words)
 
 
 def _problem(error: Exception) -> str:
@@ -134,5 +140,5 @@ def _problem(error: Exception) -> str:
 
 
 def _say(name: str, words: str, status: int) -> NoReturn:
-    print(f"{name}: {words}", file=sys.stderr)
+    print(f"{name}: {_short(words)}", file=sys.stderr)
     raise SystemExit(status) from None

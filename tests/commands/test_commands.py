@@ -87,6 +87,16 @@ def test_studies_come_with_a_clone(monkeypatch, capsys):
     assert "allowed: in a clone of the project" in complained
 
 
+@pytest.mark.parametrize("option", ["--out", "--env", "--reference", "--set", "--policy", "--nobody", "--controller"])
+def test_what_is_too_long_is_said_in_short(option, monkeypatch, capsys, tmp_path):
+    given = ["--out", str(tmp_path)] * (option != "--out")
+    long = {"--reference": "x" * 5000 + ".csv", "--controller": f"pid[{'x' * 5000}=1]", "--set": f"{'x' * 5000}=1"}
+    status, _, complained = call("evaluate", monkeypatch, capsys, *given, option, long.get(option, "x" * 5000))
+    assert status == 2
+    assert len(complained) < 1000
+    assert complained.count("\n") == 1
+
+
 COMPILING = "BirthSIM: compiling numerical kernels, usually 10 to 40 s; the result is cached.\n"
 """What the first command after an installation says besides."""
 
