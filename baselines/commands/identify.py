@@ -83,6 +83,8 @@ def main(settings: Settings) -> None:
 def _propose(settings: Settings, path: Path, rig: Parameters) -> None:
     if settings.out is not None:
         raise ValueError("--out is given; allowed with LOG or --simulate, --propose names its own file")
+    if path.suffix.lower() != ".csv":
+        raise ValueError(f"--propose {str(path)!r}; allowed: a file that ends in .csv")
     plan = propose(rig, DURATION if settings.duration is None else settings.duration, settings.seed)
     plan.write(path)
     print(f"written to {path}: {len(plan.times)} rows of time, target and openings to add to a controller's")

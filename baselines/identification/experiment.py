@@ -101,5 +101,9 @@ def read_plan(path: Path, rig: Parameters) -> Plan:
         raise ValueError(f"{where} lasts {times[-1] - times[0]:.4g} s{guess}; allowed: {SHORTEST:g} to {LONGEST:g} s")
     if np.abs(added).max() > 1:
         raise ValueError(f"{where}: an added opening of {np.abs(added).max():g}; allowed: -1 to 1")
-    check_points(where, Through(times - times[0], target.T), times[-1] - times[0], rig)
+    try:
+        through = Through(times - times[0], target.T)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
+    check_points(where, through, times[-1] - times[0], rig)
     return Plan(times, target, added)

@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.identification.faults import STILL as STANDING
 from baselines.identification.faults import clipped, held, jumps, pinned, samples_of, spikes, standing, strayed
-from baselines.identification.log_columns import OPENINGS, PRESSURES
+from baselines.identification.log_columns import OPENINGS, POSITIONS, PRESSURES
 from baselines.identification.noise import noise_of
 from baselines.identification.signals import Signal
 from baselines.identification.timing import Grid, even_grid
@@ -152,6 +152,7 @@ def _tracker(grid: Grid, positions: Array, pressures: Array, rig: Parameters) ->
         tracker.refuse(f"position = ({x:.6g}, {y:.6g}) m is unreachable, {grid.where(first, first + 1)}; allowed: {allowed}")
     tracker.take(outside, "is outside of the workspace", allowed)
     _check_samples(grid.source, positions)
+    check_moving(grid.source, POSITIONS, positions, "a log of a rig that moves")
     noise = noise_of(positions[:, fresh_rows(positions)])
     cut_off = jumps(positions, grid.period, noise)
     tracker.take(cut_off, "is cut off from the other rows by a jump", "positions that a motion leads to")

@@ -1,5 +1,6 @@
 """The proposed experiment stays within the workspace, reads back as written, and runs without touching an end stop."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,13 @@ def test_a_plan_comes_back_as_it_was_written(tmp_path: Path) -> None:
     again = read_plan(tmp_path / "plan.csv", OWNER)
     for one, other in ((plan.times, again.times), (plan.target, again.target), (plan.added, again.added)):
         assert np.allclose(one, other, rtol=1e-8, atol=1e-12)  # nine digits are written
+
+
+def test_a_plan_in_mm_is_refused_by_its_name(tmp_path: Path) -> None:
+    plan = propose(OWNER, 5.0, 4)
+    replace(plan, target=1e3 * plan.target).write(tmp_path / "plan.csv")
+    with pytest.raises(ValueError, match=r"^plan = '.*plan.csv': positions\[0, 0\] = 500; allowed: -10 to 10"):
+        read_plan(tmp_path / "plan.csv", OWNER)
 
 
 def test_a_lane_of_many_is_the_single_rig() -> None:

@@ -109,3 +109,12 @@ def test_bad_rows_are_named_and_a_fit_without_end_is_no_word_of_a_library(
     )
     assert re.search("disagree so much .*; allowed: columns in their places and units", wrong)
     assert not re.search("SciPy|LAPACK|matrix|Traceback", wrong, re.IGNORECASE)
+
+
+def test_a_plan_is_written_as_what_it_is_read_as(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, _, complained = call("identify", monkeypatch, capsys, "--propose", tmp_path / "plan.parquet")
+    assert status == 2
+    assert "plan.parquet'; allowed: a file that ends in .csv" in complained
+    assert not list(tmp_path.iterdir())

@@ -99,6 +99,7 @@ BAD: dict[str, tuple[dict[str, Callable[[Array], Array] | None], str]] = {
     "millimetres": ({"position": lambda v: 1e3 * v}, "they look like mm, allowed: m"),
     "samples": ({"position": lambda v: np.repeat(v[::700], 700)[: len(v)]},
                 "the position changes 2 times; allowed: at least 50 samples of the tracker"),
+    "one axis": ({"position_x": still}, "position_x never changes; allowed: a log of a rig that moves"),
     "rest": ({"position": still}, "the position never changes; allowed: a log of a rig that moves"),
     "short": ({"": lambda v: v[:500]}, "holds 0.499 s; allowed: at least 2 s"),
     "one row": ({"": lambda v: v[:1]}, "has 1 rows; allowed: at least 2 s of them"),
