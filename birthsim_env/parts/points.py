@@ -106,6 +106,10 @@ class Through(Trajectory):
         return rows
 
 
+UNEVEN = 0.381966
+"""Where between two values a function is asked once more: the golden section, since a fast sine may be zero halfway too."""
+
+
 class Sampled(Through):
     """A function of time (s) that returns (x, y) in m, through its values every ``GRID`` s of an ``episode``, s.
 
@@ -117,11 +121,11 @@ class Sampled(Through):
 
     def __init__(self, call: Callable[[float], Array], episode: float) -> None:
         count = max(7, round(episode / GRID) + 1)
-        times = np.linspace(0.0, episode, 2 * count - 1)
-        values = np.array([call(float(t)) for t in times])
-        rows, points = times[::2], values[::2]
+        rows = np.linspace(0.0, episode, 2 * count - 1)[::2]
+        between = rows[:-1] + UNEVEN * np.diff(rows)
+        points, asked = (np.array([call(float(t)) for t in times]) for times in (rows, between))
         super().__init__(rows, points, within=False)
-        off = np.abs(self.sample(times[1::2])[:2].T - values[1::2]).max(axis=1)
+        off = np.abs(self.sample(between)[:2].T - asked).max(axis=1)
         if (sudden := off > SUDDEN).any():
             # The worst one is at the step; its neighbours differ because the polynomials through it swing.
             k, number = int(off.argmax()), _steps(sudden)
@@ -129,7 +133,7 @@ class Sampled(Through):
             more = f", and at {number - 1} more places" if number > 1 else ""
             warnings.warn(
                 f"reference: the function steps {where}{more}, or moves faster than its values every {GRID:g} s tell; the "
-                f"target goes smoothly from one to the other, and halfway is {1e3 * off[k]:.3g} mm off",
+                f"target goes smoothly from one to the other, and between them is {1e3 * off[k]:.3g} mm off",
                 stacklevel=2,
             )
             super().__init__(rows, points, within=sudden)

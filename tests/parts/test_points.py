@@ -195,3 +195,9 @@ def test_a_smooth_function_passes_its_values_where_it_does(recwarn):
     path = Sampled(lambda time: np.array([0.5 + 0.05 * math.cos(1.57 * (time - 0.003)), 0.0]), 4.0)
     assert path.sample(np.array([0.003]))[0, 0] == pytest.approx(0.55, abs=1e-11)
     assert not recwarn
+
+
+@pytest.mark.parametrize("frequency", [60.0, 100.0, 200.0, 400.0])
+def test_a_sine_that_is_zero_at_every_value_is_seen_between_them(frequency: float) -> None:
+    with pytest.warns(UserWarning, match="reference: the function steps"):
+        Sampled(lambda t: np.array([0.5 + 0.01 * np.sin(2 * np.pi * frequency * t), 0.0]), 2.0)
