@@ -4,17 +4,13 @@ import errno
 import json
 import math
 import os
-import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from birthsim_env.endings import later_signals
 from birthsim_env.partials import place, shared, tidy_below
-
-ENDINGS = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
-"""Signals that ask a process to end; Windows has two of them."""
 
 
 def make_folder(path: Path) -> Path:
@@ -109,23 +105,6 @@ def _join(own: Path, folder: Path) -> None:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(there))
     for path, there in steps:
         path.replace(there)
-
-
-@contextmanager
-def later_signals() -> Iterator[None]:
-    """What happens here is not torn by a signal that asks the process to end: that comes after it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-    before = {ending: signal.signal(ending, lambda number, _: came.append(number)) for ending in ENDINGS}
-    try:
-        yield
-    finally:
-        for ending, handler in before.items():
-            signal.signal(ending, handler)
-        for one in came:
-            signal.raise_signal(one)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -22,6 +22,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from birthsim_env.endings import later_signals
+
 HIDDEN = ".birthsim"
 """Name of the folder for what is not whole."""
 
@@ -39,17 +41,21 @@ def place(folder: Path) -> Iterator[Path]:
     Raises ``OSError`` where ``folder`` cannot be written to, and ``ValueError`` where ``HIDDEN`` in it is no folder.
     """
     tidy(folder)
-    lock, descriptor = _new_lock(folder / HIDDEN)
-    own = lock.with_suffix("")
+    made: list[tuple[Path, int]] = []
     try:
+        with later_signals():  # which would leave a lock behind
+            made.append(_new_lock(folder / HIDDEN))
+        own = made[0][0].with_suffix("")
         own.mkdir()
         shared(own)
         yield own
     finally:
-        _remove(lock)
-        os.close(descriptor)
-        with suppress(OSError):  # others have places there
-            lock.parent.rmdir()
+        with later_signals():
+            for lock, descriptor in made:
+                _remove(lock)
+                os.close(descriptor)
+                with suppress(OSError):  # others have places there
+                    lock.parent.rmdir()
 
 
 def tidy(folder: Path) -> None:

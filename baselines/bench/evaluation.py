@@ -105,7 +105,7 @@ def evaluate_worlds(
     **arguments: Unpack[Arguments],
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
-    refuse_unknown(arguments, ("device",), GIVEN)
+    refuse_unknown(arguments, ("device", "max_episode_steps"), GIVEN)
     if arguments.get("device") is not None:
         said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
         raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]

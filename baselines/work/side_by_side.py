@@ -17,8 +17,8 @@ from typing import Any
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
+from birthsim_env.endings import ENDINGS
 from birthsim_env.extras import installation
-from birthsim_env.files import ENDINGS
 
 Work = Callable[..., Any]
 Pieces = Sequence[tuple[Any, ...]]

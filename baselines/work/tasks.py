@@ -14,7 +14,8 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.work.side_by_side import side_by_side
-from birthsim_env.files import finite, later_signals, write_json
+from birthsim_env.endings import later_signals
+from birthsim_env.files import finite, write_json
 from birthsim_env.physics.compiled.sources import hashes
 from birthsim_env.physics.rig.json_reading import read_json
 

@@ -29,9 +29,14 @@ KNOWN = TRUE.replace({one.name: value_of(OWNER, one.name) for one in SOME} | {LA
 
 @pytest.mark.slow
 def test_without_noise_the_rig_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of neighbouring windows, as in ``refine``: a bristle that a guess bends the wrong way is then found from the one before.
+    Of six windows far apart one stayed so on some processors, and took the rest along."""
     monkeypatch.setattr(starts, "CLOSE", 1e-3)
-    windows = cut(part(trial("ideal"), 0, 2500), KNOWN, 0.1).some(np.array([5, 8, 11, 14, 17, 20]))
-    found = search(Problem(windows, Noise(10.0, 1e-5), KNOWN, SOME, lambda: None), coordinates(KNOWN, SOME), 40)
+    windows = cut(part(trial("ideal"), 0, 2500), KNOWN, 0.1).some(np.arange(3, 21))
+    asked = Problem(windows, Noise(10.0, 1e-5), KNOWN, SOME, lambda: None)
+    first = search(asked, coordinates(KNOWN, SOME), 40)
+    asked.begin_anew(first.rig, asked.offsets.sizes)
+    found = search(asked, first.theta, 40)
     # The search ends at steps of 1e-4; what the owner's spread pulls is far less.
     assert np.abs(found.theta - coordinates(TRUE, SOME)).max() < 2e-4
     assert found.noise.pressure < 2.0
