@@ -56,20 +56,28 @@ COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
 """What ``command`` of a law may take besides the signals."""
 
 
+_COUNTS = {"position": 2, "velocity": 2, "pressures": 4, "user_force": 2, "acceleration": 2}
+"""Rows of the fields of a ``Measurement`` that have some."""
+
+
 def lanes_of(measurement: Measurement, reference: Reference) -> int:
     """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
-    rows = {"position": 2, "velocity": 2, "pressures": 4, "user_force": 2, "acceleration": 2}
     shape = shape_of(measurement.position)
     if len(shape) != 2:
         raise ValueError(f"measurement.position has shape {shape}; allowed: (2, N), or (2,) for one rig")
     lanes = shape[1]
-    signals = [(f"measurement.{name}", getattr(measurement, name), count) for name, count in rows.items()]
-    for name, signal, count in (*signals, ("reference.rows", reference.rows, REFERENCES)):
-        if (signal is not None or name != "measurement.acceleration") and shape_of(signal) != (count, lanes):
-            raise ValueError(
-                f"{name} has shape {shape_of(signal)}; allowed: {(count, lanes)}, with the lanes of measurement.position"
-            )
+    for name, count in _COUNTS.items():
+        signal = getattr(measurement, name)
+        if (signal is not None or name != "acceleration") and shape_of(signal) != (count, lanes):
+            raise _of_other_lanes(f"measurement.{name}", signal, count, lanes)
+    if shape_of(reference.rows) != (REFERENCES, lanes):
+        raise _of_other_lanes("reference.rows", reference.rows, REFERENCES, lanes)
     return lanes
+
+
+def _of_other_lanes(name: str, signal: object, count: int, lanes: int) -> ValueError:
+    allowed = f"allowed: {(count, lanes)}, with the lanes of measurement.position"
+    return ValueError(f"{name} has shape {shape_of(signal)}; {allowed}")
 
 
 def feedforward_rows(

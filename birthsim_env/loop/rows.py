@@ -5,10 +5,12 @@
 
 from typing import Any
 
+import numpy as np
+
 from birthsim_env.loop.signals import Measurement, Point, Reference
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, STATE_NAMES, STATE_UNITS, Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
-from birthsim_env.physics.rig.arrays import floats_of, shape_of
+from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.values import shown
 
 
@@ -79,21 +81,28 @@ def signal_of(name: str, value: Any) -> Array:
         raise ValueError(f"{name} = {shown(value)}: {error}; allowed: an array of numbers") from error
 
 
+_FLOAT = np.dtype(np.float64)
+
+_PLACES: dict[str, int | slice] = {
+    "time": Signals.time.first, "position": Signals.position.place, "velocity": Signals.velocity.place,
+    "position_time": Signals.position_time.first, "pressures": Signals.pressure.place, "user_force": Signals.user_force.place,
+    "acceleration": Signals.acceleration.place,
+}  # fmt: skip
+"""Field of a ``Measurement`` -> its row, or rows."""
+
+
 def fill_measurement(rows: Array, measurement: Measurement) -> None:
     """Write a measurement over N lanes into the rows of ``Signals``; ``ValueError`` for what are no numbers, by name."""
-    seen, m = Signals(rows), measurement
-    for name, own, value in (
-        ("time", seen.time, m.time), ("position", seen.position, m.position), ("velocity", seen.velocity, m.velocity),
-        ("position_time", seen.position_time, m.position_time), ("pressures", seen.pressure, m.pressures),
-        ("user_force", seen.user_force, m.user_force), ("acceleration", seen.acceleration, m.acceleration),
-    ):  # fmt: skip
+    for name, place in _PLACES.items():
+        value = getattr(measurement, name)
         if value is None and name == "acceleration":
             continue
-        signal = signal_of(f"measurement.{name}", value)
-        try:
-            own[:] = signal
-        except ValueError:
-            raise ValueError(f"measurement.{name} has shape {shape_of(value)}; allowed: {own.shape}") from None
+        if type(value) is not np.ndarray or value.dtype is not _FLOAT:
+            value = signal_of(f"measurement.{name}", value)
+        own = rows[place]
+        if value.shape != own.shape and value.ndim:
+            raise ValueError(f"measurement.{name} has shape {value.shape}; allowed: {own.shape}")
+        own[:] = value
 
 
 def measurement_of(rows: Array, sampled: bool, has_acceleration: bool) -> Measurement:
