@@ -69,7 +69,7 @@ ON_FAULT = {"hold": 0.0, "vent": -1.0}
 """What the valves get once the control has ended: closed, or all chambers to the exhaust (a 5/3 valve cannot, and closes)."""
 
 FAULT_TIME = 0.03
-"""s, by default; measured by ``python -m studies.missing_samples``: until then 95 of 100 heads stray by less than 5 mm."""
+"""s, by default; measured by ``python -m studies.missing_samples --lanes 32``: 95 of 100 heads stray by some 5 mm at most."""
 
 STIFFNESS, PNEUMATIC = 2000.0, (3600.0, 1800.0)
 """N/m; assumed: what is asked for until something good is."""
