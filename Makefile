@@ -28,12 +28,12 @@ OLDEST := numba==0.65.0 llvmlite==0.47.0
 PYTEST := $(BIN)/python -m pytest -n 2 --durations 20 --durations-min 1
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
-# Every file of an installation has its hash in requirements/, which make lock writes from constraints.txt.
+# Every file of an installation has its hash in packaging/requirements/, which make lock writes from constraints.txt.
 # Python writes the byte code of what is imported, and keeps it: --no-compile leaves out the rest.
-LOCKED := install --quiet --no-deps --no-compile --require-hashes --requirement requirements
+LOCKED := install --quiet --no-deps --no-compile --require-hashes --requirement packaging/requirements
 export PYTHONDONTWRITEBYTECODE :=
 LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
-  --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
+  --custom-compile-command "make lock" --constraint constraints.txt --output-file packaging/requirements
 TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
 # What an installation here has; cluster (Ray) is left out.
 EXTRAS := agents onnx tune sweep control jax build log video live docs dev
@@ -56,7 +56,7 @@ POLICIES := agents/policies
 .PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links golden clean
 
 # What a picture needs, and the project itself.
-$(BASE): pyproject.toml requirements/base.txt
+$(BASE): pyproject.toml packaging/requirements/base.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
 	$(PIP) $(LOCKED)/base.txt
 	$(PIP) install --quiet --no-deps --no-build-isolation --no-compile --editable .
@@ -64,18 +64,18 @@ $(BASE): pyproject.toml requirements/base.txt
 
 # What a training needs. PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this
 # Python, PyPI's with CUDA.
-$(AGENTS): $(BASE) requirements/torch.txt requirements/agents.txt
+$(AGENTS): $(BASE) packaging/requirements/torch.txt packaging/requirements/agents.txt
 	$(PIP) $(LOCKED)/torch.txt 2>/dev/null || $(PIP) $(TORCH_CPU) $(LOCKED)/torch.txt \
 	  || { echo "No CPU build of PyTorch within reach: PyPI's comes with CUDA, 2.2 GB more"; $(PIP) $(LOCKED)/torch-cuda.txt; }
 	$(PIP) $(LOCKED)/agents.txt
 	touch $@
 
 # What tests and documentation need besides.
-$(READY): $(AGENTS) requirements/project.txt
+$(READY): $(AGENTS) packaging/requirements/project.txt
 	$(PIP) $(LOCKED)/project.txt
 	touch $@
 
-$(TOOLS)/.ready: requirements/tools.txt
+$(TOOLS)/.ready: packaging/requirements/tools.txt
 	test -x $(TOOLS)/bin/python || python3 -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip --disable-pip-version-check --no-input $(LOCKED)/tools.txt
 	touch $@
@@ -118,22 +118,22 @@ quick: $(READY)
 
 # Each client in a virtual environment of its own, with the wheel; one after another, none is left. CLIENTS="sb3 rllib" names some.
 test-weekly:
-	python3 -m studies.clients $(CLIENTS)
+	python3 -m lab.studies.clients $(CLIENTS)
 
 portable: $(READY)
-	$(BIN)/python -m studies.processors
+	$(BIN)/python -m lab.studies.processors
 
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m studies.processors here
+	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m lab.studies.processors here
 
 verify: $(READY)
 	$(BIN)/birthsim study accuracy
 	$(BIN)/birthsim study verification balances
 	$(BIN)/birthsim study verification report
 
-# Survivors are judged by hand, in studies/verification/survivors.toml; a test names those that are not.
+# Survivors are judged by hand, in lab/studies/verification/survivors.toml; a test names those that are not.
 verify-slow: $(READY)
 	mkdir -p $(OUT)/verify
 	$(BIN)/birthsim study mutation --limit 3 --budget 4 --every 3 --out $(OUT)/verify/mutation.json
@@ -142,11 +142,11 @@ verify-slow: $(READY)
 	$(MAKE) verify
 
 kills: $(READY)
-	nice $(BIN)/python -m studies.kills --out docs/kills.json --page
+	nice $(BIN)/python -m lab.studies.kills --out docs/kills.json --page
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live studies tests .ci
-	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_live studies tests .ci
+	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live lab tests .ci
+	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_live lab tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/ruff check docs/conf.py docs/_generate
@@ -154,26 +154,26 @@ lint: $(READY)
 
 # CHANGELOG.md tells of the past.
 prose: $(NPM)/.ready
-	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md CODE_OF_CONDUCT.md paper.md docs
+	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md .github/SECURITY.md .github/CODE_OF_CONDUCT.md lab/paper/paper.md docs
 
 # What comes from npm: the reader of the prose, and axe-core, with which tests look at pages.
-$(NPM)/.ready: requirements/npm/package.json requirements/npm/package-lock.json
+$(NPM)/.ready: packaging/requirements/npm/package.json packaging/requirements/npm/package-lock.json
 	mkdir -p $(NPM)
-	cp requirements/npm/package.json requirements/npm/package-lock.json $(NPM)
+	cp packaging/requirements/npm/package.json packaging/requirements/npm/package-lock.json $(NPM)
 	npm ci --prefix $(NPM) --ignore-scripts --no-audit --no-fund --silent
 	touch $@
 
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
 lock: $(TOOLS)/.ready
-	$(LOCK)/base.txt pyproject.toml requirements/build.in
-	$(LOCK)/agents.txt --extra agents $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml requirements/build.in
-	$(LOCK)/project.txt $(addprefix --extra ,$(EXTRAS)) $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml requirements/build.in
-	$(LOCK)/torch-cuda.txt requirements/torch-cuda.in
-	$(LOCK)/tools.txt requirements/tools.in
+	$(LOCK)/base.txt pyproject.toml packaging/requirements/build.in
+	$(LOCK)/agents.txt --extra agents $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml packaging/requirements/build.in
+	$(LOCK)/project.txt $(addprefix --extra ,$(EXTRAS)) $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml packaging/requirements/build.in
+	$(LOCK)/torch-cuda.txt packaging/requirements/torch-cuda.in
+	$(LOCK)/tools.txt packaging/requirements/tools.in
 
 # What is known against the locked versions, as PyPI tells it; --strict: a package that PyPI says nothing of fails too.
 audit: $(TOOLS)/.ready
-	$(TOOLS)/bin/pip-audit --strict --no-deps --disable-pip --requirement requirements/project.txt --requirement requirements/torch-cuda.txt
+	$(TOOLS)/bin/pip-audit --strict --no-deps --disable-pip --requirement packaging/requirements/project.txt --requirement packaging/requirements/torch-cuda.txt
 
 sbom: $(READY) $(TOOLS)/.ready
 	mkdir -p $(OUT)
@@ -189,8 +189,8 @@ lint-workflows: $(TOOLS)/.ready
 	$(TOOLS)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(TOOLS)/bin/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
 	$(TOOLS)/bin/zizmor --offline --quiet .github
-	$(TOOLS)/bin/hadolint Containerfile
-	$(TOOLS)/bin/python -c "import rattler_build as r; r.Stage0Recipe.from_file('conda/recipe.yaml').render(r.VariantConfig())"
+	$(TOOLS)/bin/hadolint packaging/container/Containerfile
+	$(TOOLS)/bin/python -c "import rattler_build as r; r.Stage0Recipe.from_file('packaging/conda/recipe.yaml').render(r.VariantConfig())"
 
 bench: $(READY)
 	$(BIN)/birthsim study speed --out $(OUT)/bench

@@ -84,15 +84,20 @@ def one_valve_openings(rate: float, c: CylinderAir, p: Rig) -> tuple[float, floa
     The pneumatic stiffness is left to itself.
     """
     stroke = c.length_p + c.length_n
-    active = control_model.active_flow_for(
-        rate, stiffness_of(c, p), c.speed, stroke, p.index, p.gas * p.temperature
-    )  # fmt: skip
+    active = control_model.active_flow_for(rate, stiffness_of(c, p), c.speed, stroke, p.index, p.gas * p.temperature)
     fill_p, drain_p = driving_flows(c.pp, p)
     fill_n, drain_n = driving_flows(c.pn, p)
     opened = valves.opening_for_active_flow(
-        active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / c.length_p, 0.5 * stroke / c.length_n, p.conductance,
+        active,
+        fill_p,
+        drain_p,
+        fill_n,
+        drain_n,
+        0.5 * stroke / c.length_p,
+        0.5 * stroke / c.length_n,
+        p.conductance,
         p.leakage,
-    )  # fmt: skip
+    )
     return opened, -opened
 
 
@@ -122,9 +127,7 @@ def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: 
 
 
 @helper
-def pressure_openings(
-    rate: float, wanted: float, wanted_rate: float, c4: float, c: CylinderAir, p: Rig
-) -> tuple[float, float]:  # fmt: skip
+def pressure_openings(rate: float, wanted: float, wanted_rate: float, c4: float, c: CylinderAir, p: Rig) -> tuple[float, float]:
     """``force_first_openings`` for dF/dt = ``rate`` while the pneumatic stiffness tends to ``wanted`` at c4."""
     return force_first_openings(rate, wanted_rate - c4 * (stiffness_of(c, p) - wanted), c, p)
 

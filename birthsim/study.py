@@ -7,10 +7,10 @@ from importlib.util import find_spec
 
 def main() -> None:
     """Hand the arguments to ``studies``; without a clone say that they are not here."""
-    if find_spec("studies") is None or find_spec("studies.door") is None:
+    if find_spec("studies") is None or find_spec("lab.studies.door") is None:
         if sys.argv[1:] in (["-h"], ["--help"]):
             print("usage: birthsim study ...\n\nStudies come with a clone of the project.\n\nexample: birthsim study speed")
             raise SystemExit(0)
         print("birthsim study: error: there is no package 'studies' here; allowed: in a clone of the project", file=sys.stderr)
         raise SystemExit(2)
-    import_module("studies.door").main(sys.argv[1:])
+    import_module("lab.studies.door").main(sys.argv[1:])

@@ -51,9 +51,16 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
     images = bundle.images()
     built = _object(bundle, target, folder, images)
     link(
-        "ld.lld", "-m", EMULATIONS[target], "-shared", "-soname", "libbirthsim.so", "-o", str(folder / "libbirthsim.so"),
+        "ld.lld",
+        "-m",
+        EMULATIONS[target],
+        "-shared",
+        "-soname",
+        "libbirthsim.so",
+        "-o",
+        str(folder / "libbirthsim.so"),
         str(folder / "birthsim.o"),
-    )  # fmt: skip
+    )
     loops = [name for name in images if name != "plant" and not name.startswith("law_")]
     write_header(images, folder, next(iter(loops), None))
     if loops:

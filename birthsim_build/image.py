@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_build.layout import FIRST, ROWS
-from birthsim_env.loop.gradients.traced import Adjoint
+from birthsim_env.gradients.traced import Adjoint
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import TABLE, Stage
 from birthsim_env.physics.compiled.lanes import Array

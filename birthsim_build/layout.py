@@ -54,9 +54,10 @@ class Inputs(Rows):
         "scenario_Kclx scenario_Kcly scenario_Kpneu1 scenario_Kpneu2", "N/m", "setpoint of the scenario; written by the loop"
     )
     passes = rows(
-        "pass_target pass_setpoints pass_force", "1",
+        "pass_target pass_setpoints pass_force",
+        "1",
         "1 begins a passage from what was asked for till now: in the next period all stays as it was, and this becomes 0",
-    )  # fmt: skip
+    )
     passages = part(Passages, "written by the loop")
     given = part(Reference, "what was asked for in the period before; written by the loop")
     given_force = rows("given_force_x given_force_y", "N", "of the hand in the period before; written by the loop")

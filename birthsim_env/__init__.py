@@ -6,13 +6,13 @@ Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v2``, ``Descent
 
 from gymnasium.envs.registration import register, registry
 
+from birthsim_env.gradients.linear.linearize import balanced_pressures, linearize, linearize_lanes
+from birthsim_env.gradients.linear.model import LinearModel
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.linear.linearize import balanced_pressures, linearize, linearize_lanes
-from birthsim_env.physics.linear.model import LinearModel
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import normalized_score, reference_scores

@@ -18,7 +18,7 @@ from birthsim_env.state import State, give_state, take_state
 
 if TYPE_CHECKING:
     from birthsim_env.drawing.rendering import Renderer
-    from birthsim_env.gradients import Recorder
+    from birthsim_env.gradients.recorder import Recorder
 
 WINDOW_FRAMES_PER_SECOND = 50
 PATH_POINTS = 160
@@ -44,9 +44,14 @@ class Episodes:
         self._numbers: NDArray[np.int64] = np.full(lanes, -1, dtype=np.int64)
         self._seeds: list[int] = []
         self._outcome = Outcome(
-            lanes, self.simulation.nominal, self.action_size, len(setup.actuation.memory_names), setup.policy_period,
-            self.simulation.period, self.simulation.parameters.mechanics.impact_speed,
-        )  # fmt: skip
+            lanes,
+            self.simulation.nominal,
+            self.action_size,
+            len(setup.actuation.memory_names),
+            setup.policy_period,
+            self.simulation.period,
+            self.simulation.parameters.mechanics.impact_speed,
+        )
         beginning, closing = self._outcome.stages()
         self.simulation.beginning, self.simulation.closing = [beginning], [closing]
         self._renderer: Renderer | None = None
@@ -126,7 +131,7 @@ class Episodes:
 
     def record(self) -> "Recorder":
         """What keeps every policy step from now on, for gradients."""
-        from birthsim_env.gradients import Recorder  # late: it generates code
+        from birthsim_env.gradients.recorder import Recorder  # late: it generates code
 
         return Recorder(self.simulation)
 

@@ -17,7 +17,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.state import State
 
 if TYPE_CHECKING:
-    from birthsim_env.gradients import Recorder
+    from birthsim_env.gradients.recorder import Recorder
 
 
 def measurement_of(measurement: Measurement, lane: int) -> Measurement:

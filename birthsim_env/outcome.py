@@ -92,11 +92,9 @@ class Outcome:
             period=policy_period, jumped_below=policy_period - 0.5 * period, impact_speed=impact_speed
         )
         self._constants = [
-            About.numbers(
-                stepped=stepped, limits=limits, actions=actions, shown=shown, rig=nominal, scales=observation.SCALES
-            )
+            About.numbers(stepped=stepped, limits=limits, actions=actions, shown=shown, rig=nominal, scales=observation.SCALES)
             for stepped in (False, True)
-        ]  # fmt: skip
+        ]
 
     def named(self) -> list[tuple[Array, list[str]]]:
         """``terms``, ``ends`` and ``rows`` with the names of their rows."""

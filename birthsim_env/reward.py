@@ -93,9 +93,16 @@ class Tally(Rows):
 
 @helper
 def assess(
-    world: World, reference: Reference, owed: Owed, action: Array, last_action: Array, limits: Limits, terms: Terms,
-    failed: Array, n: int,
-) -> None:  # fmt: skip
+    world: World,
+    reference: Reference,
+    owed: Owed,
+    action: Array,
+    last_action: Array,
+    limits: Limits,
+    terms: Terms,
+    failed: Array,
+    n: int,
+) -> None:
     """Writes ``terms`` of n lanes, and 1 in lanes (N,) that have ``failed``: those that have left the physical range.
 
     ``owed`` is carried on. ``action`` and ``last_action`` (size, N).

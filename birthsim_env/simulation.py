@@ -36,7 +36,7 @@ from birthsim_env.physics.strength import require_carried
 from birthsim_env.restored import Declared, Kept, is_own
 
 if TYPE_CHECKING:
-    from birthsim_env.gradients import Pullback
+    from birthsim_env.gradients.recorder import Pullback
 
 LOOKS = ("target", "setpoints", "hand", "jumps", "sensors")
 """Parts that run where an episode begins."""
@@ -172,8 +172,9 @@ class Simulation(Instant):
         self.run(self.periods)
 
     def vjp(self, actions: Array) -> "Pullback":
-        """``step``, with its bits; returns its pullback, see ``gradients.Recorder.taken``. Later steps are taped too."""
-        from birthsim_env.gradients import Recorder  # late: it generates code
+        """``step``, with its bits; returns its pullback, see ``gradients.recorder.Recorder.taken``. Later
+        steps are taped too."""
+        from birthsim_env.gradients.recorder import Recorder  # late: it generates code
 
         recorder = self.recorder if isinstance(self.recorder, Recorder) else Recorder(self)
         self.step(actions)

@@ -42,9 +42,12 @@ def train(device: str, updates: int, lanes: int) -> list[float]:
     torch.manual_seed(0)
     torch.set_default_device("cuda" if device == "cuda" else "cpu")
     env = gymnasium.make_vec(
-        "BirthSIM/Circle-v1", num_envs=lanes, randomize=True, autoreset_mode="SameStep",
+        "BirthSIM/Circle-v1",
+        num_envs=lanes,
+        randomize=True,
+        autoreset_mode="SameStep",
         device=None if device == "cpu" else device,
-    )  # fmt: skip
+    )
     worlds = Worlds(env)
     policy = make_policy(env.single_observation_space.shape[0], env.single_action_space.shape[0])
     adam = torch.optim.Adam(policy.parameters(), lr=3e-3, betas=(0.9, 0.99))

@@ -48,8 +48,10 @@ if __name__ == "__main__":
     arguments.out.mkdir(parents=True, exist_ok=True)
     jobs = [
         (name, environment, seed, arguments.steps, arguments.out)
-        for environment in arguments.env for name in EXAMPLES for seed in range(arguments.seeds)
-    ]  # fmt: skip
+        for environment in arguments.env
+        for name in EXAMPLES
+        for seed in range(arguments.seeds)
+    ]
     with ThreadPoolExecutor(arguments.jobs) as pool:
         curves = list(tqdm(pool.map(run, jobs), total=len(jobs), unit=" trainings"))
     print(f"{'environment':22}{'algorithm':20}{'seed':>5}{'steps of the first':>20}{'and last episodes':>19}{'score':>8}")

@@ -32,8 +32,10 @@ def network(size):
 
 actor = ProbabilisticActor(
     TensorDictModule(nn.Sequential(network(2 * outputs), NormalParamExtractor()), ["observation"], ["loc", "scale"]),
-    in_keys=["loc", "scale"], distribution_class=TanhNormal, return_log_prob=True,
-)  # fmt: skip
+    in_keys=["loc", "scale"],
+    distribution_class=TanhNormal,
+    return_log_prob=True,
+)
 critic = ValueOperator(network(1), in_keys=["observation"])
 advantage = GAE(gamma=0.99, lmbda=0.95, value_network=critic, average_gae=True)
 loss = ClipPPOLoss(actor, critic, clip_epsilon=0.2)

@@ -16,7 +16,7 @@ from numba.core.registry import CPUDispatcher
 from birthsim_env.loop.stage import ARGUMENTS, address_of
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.processors import ROOT
+from lab.studies.processors import ROOT
 
 PACKAGES = ("birthsim_env", "baselines", "agents")
 

@@ -91,15 +91,21 @@ def main(settings: Settings) -> None:
             k, one.seed, None, one.observations, one.actions, list(one.rewards), *ends(one.terminated, len(one.rewards))
         )
         for k, one in enumerate(episodes)
-    ]  # fmt: skip
+    ]
     with whole_folder(out, name) as place, disk_errors(settings.out / name), warnings.catch_warnings():
         os.environ["MINARI_DATASETS_PATH"] = str(place)
         warnings.simplefilter("ignore", UserWarning)  # of an author without an address
         minari.create_dataset_from_buffers(
-            name, buffers, made(settings.env, gymnasium.make), algorithm_name=LEVELS[settings.level] or "uniform actions",
-            author="The BirthSIM developers", description=text, requirements=[f"birthsim=={__version__}"],
-            ref_min_score=known["shut valves"]["return"], ref_max_score=known["best classical law"]["return"],
-        )  # fmt: skip
+            name,
+            buffers,
+            made(settings.env, gymnasium.make),
+            algorithm_name=LEVELS[settings.level] or "uniform actions",
+            author="The BirthSIM developers",
+            description=text,
+            requirements=[f"birthsim=={__version__}"],
+            ref_min_score=known["shut valves"]["return"],
+            ref_max_score=known["best classical law"]["return"],
+        )
         write_text(place / name / "README.md", text)
     print(text)
     print(f"written to {settings.out / name}/")
@@ -165,9 +171,12 @@ def _batch(environment: str, level: str, seeds: list[int]) -> Iterator[Recorded]
     # A lane that has ended goes on with another episode, which nobody asked for.
     for lane, (seed, steps) in enumerate(zip(seeds, np.argmax(over, axis=0) + 1, strict=True)):
         yield Recorded(
-            seed, np.array(seen)[: steps + 1, lane], np.array(acted)[:steps, lane], np.array(paid)[:steps, lane],
+            seed,
+            np.array(seen)[: steps + 1, lane],
+            np.array(acted)[:steps, lane],
+            np.array(paid)[:steps, lane],
             bool(terminated[steps - 1][lane]),
-        )  # fmt: skip
+        )
 
 
 def card(settings: Settings, name: str, episodes: list[Recorded]) -> str:

@@ -75,11 +75,12 @@ def main(settings: Settings) -> None:
         there = [row for row in rows if row["setpoint"] == setpoint]
         felt = [
             (
-                row["controller"], *(f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})" for label in labels),
+                row["controller"],
+                *(f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})" for label in labels),
                 str(row["lost"]),
             )
             for row in there
-        ]  # fmt: skip
+        ]
         title = f"Stiffness test at {setpoint:g} N/m on rigs drawn at random, {there[0]['cases']} pushes: median (95 %)."
         tables.append((title, head, felt))
     marked = [f"{title}\n\n{markdown(top, cells)}\n" for title, top, cells in tables]

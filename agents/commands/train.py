@@ -73,9 +73,7 @@ def _one(
     return reached
 
 
-def _report(
-    training: TrainingSettings, residual: ResidualSettings, seeds: list[int], results: list[dict[str, Any]]
-) -> None:  # fmt: skip
+def _report(training: TrainingSettings, residual: ResidualSettings, seeds: list[int], results: list[dict[str, Any]]) -> None:
     law, paper = results[0]["law"], results[0]["paper"]
     print(
         f"\n{training.environment}, {training.validation_lanes} validation episodes, of which {law['infeasible']} ask for more"

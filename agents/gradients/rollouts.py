@@ -92,9 +92,12 @@ class Worlds:
 
         def pull(carried: Any, observation: Any, reward: Any, motion: Any, state: Any) -> tuple[Any, Any]:
             late, action = back(
-                carried=carried * lives, observation=observation * lives[:, None], reward=reward, motion=motion * lives,
+                carried=carried * lives,
+                observation=observation * lives[:, None],
+                reward=reward,
+                motion=motion * lives,
                 state=state * lives,
-            )  # fmt: skip
+            )
             return late, action.T.astype(np.float32)
 
         return pull

@@ -194,7 +194,7 @@ def remember(enters: Array, own: Array, memory: Array) -> None:
 @helper
 def answer(
     tables: int, layers: int, squashed: bool, observed: NDArray[np.float32], space: Array, own: Array, actions: Any
-) -> None:  # fmt: skip
+) -> None:
     """Writes ``actions`` (N, outputs) for observations (N, inputs); ``space`` is ``PolicyNetwork.room``, and the memory ``own``
     (N, cells) goes on. ``tables`` is the address of the description of ``PolicyNetwork.tables``."""
     mean, deviation, last, cells = table1(tables, 0), table1(tables, 1), layers - 1, own.shape[1]
@@ -230,5 +230,5 @@ def _through(tables: int, k: int, squashed: bool, x: Array, y: Array) -> None:
 @kernel
 def _answer(
     tables: int, layers: int, squashed: bool, observed: NDArray[np.float32], space: Array, own: Array, actions: Any
-) -> None:  # fmt: skip
+) -> None:
     answer(tables, layers, squashed, observed, space, own, actions)

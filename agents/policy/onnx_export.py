@@ -131,9 +131,15 @@ def _traced(module: PolicyModule, inputs: int, cells: int) -> Any:
         # PyTorch calls this exporter deprecated; the one that takes its place needs onnxscript, which nothing else here does.
         warnings.simplefilter("ignore", DeprecationWarning)
         torch.onnx.export(
-            module, tuple(zeros.values()), path, dynamo=False, opset_version=OPSET, input_names=list(zeros),
-            output_names=outputs, dynamic_axes={name: {0: "batch"} for name in (*zeros, *outputs)},
-        )  # fmt: skip
+            module,
+            tuple(zeros.values()),
+            path,
+            dynamo=False,
+            opset_version=OPSET,
+            input_names=list(zeros),
+            output_names=outputs,
+            dynamic_axes={name: {0: "batch"} for name in (*zeros, *outputs)},
+        )
         return onnx.load(path)
 
 

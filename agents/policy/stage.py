@@ -60,9 +60,15 @@ def policy_stage(network: PolicyNetwork, periods: int, actions: int, shown: int,
     """A network that is asked every ``periods`` control periods; the law shows ``shown`` rows of its memory, and its owner
     describes the rig as ``nominal`` (PARAMETERS,)."""
     about = About.numbers(
-        periods=periods, actions=actions, shown=shown, layers=len(network.layers), squashed=network.squashed,
-        cells=network.cells, rig=nominal, scales=SCALES,
-    )  # fmt: skip
+        periods=periods,
+        actions=actions,
+        shown=shown,
+        layers=len(network.layers),
+        squashed=network.squashed,
+        cells=network.cells,
+        rig=nominal,
+        scales=SCALES,
+    )
     observed: NDArray[Any] = np.zeros((lanes, network.inputs), dtype=np.float32)
     tables = (observed, network.room(lanes), *network.tables)
     return Stage(decide, about, np.zeros((Memory.size + network.cells, lanes)), tables, sees_world=False)

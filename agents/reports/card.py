@@ -83,34 +83,36 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
     ]
     law, network = policy.settings.law, policy.network
     made = about.get("algorithm") or "imitation of teachers"
-    return "\n".join([
-        "---",
-        "license: mit",
-        "library_name: birthsim",
-        "pipeline_tag: reinforcement-learning",
-        "tags: [reinforcement-learning, gymnasium, haptics, birthsim]",
-        f"model-index: {json.dumps([{'name': name, 'results': [result]}])}",
-        "---",
-        "",
-        f"# {name}",
-        "",
-        f"This policy {'drives the valves by itself' if law == NO_LAW else f'corrects the controller `{law}`'} "
-        f"in `{policy.environment}` of BirthSIM {__version__}, at {1 / policy.settings.policy_period:g} Hz.",
-        f"It was trained by {made}, with `sensors={about['sensors']!r}`, `randomize={about['randomize']}`.",
-        f"It takes {network.inputs} observations and gives {network.outputs} actions.",
-        "",
-        *table,
-        "",
-        f"All met the same worlds: {EPISODES} episodes from seed {SEED}, of the kind that the training had, without those that "
-        "ask for more than the rig's strength. No training, validation or design had them.",
-        "",
-        *(f"- {_said(who, rows, k)}" for k, who in enumerate(whom) if k),
-        "- A small error does not say what a hand feels; in a clone, `birthsim study haptics` measures that.",
-        "- It is a policy of a simulation. No real rig has run it, and it is no medical device.",
-        "",
-        f"      birthsim evaluate --controller {' '.join(whom[1:])} residual --policy FOLDER --sensors {about['sensors']}",
-        "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "---",
+            "license: mit",
+            "library_name: birthsim",
+            "pipeline_tag: reinforcement-learning",
+            "tags: [reinforcement-learning, gymnasium, haptics, birthsim]",
+            f"model-index: {json.dumps([{'name': name, 'results': [result]}])}",
+            "---",
+            "",
+            f"# {name}",
+            "",
+            f"This policy {'drives the valves by itself' if law == NO_LAW else f'corrects the controller `{law}`'} "
+            f"in `{policy.environment}` of BirthSIM {__version__}, at {1 / policy.settings.policy_period:g} Hz.",
+            f"It was trained by {made}, with `sensors={about['sensors']!r}`, `randomize={about['randomize']}`.",
+            f"It takes {network.inputs} observations and gives {network.outputs} actions.",
+            "",
+            *table,
+            "",
+            f"All met the same worlds: {EPISODES} episodes from seed {SEED}, of the kind that the training had, without those "
+            "that ask for more than the rig's strength. No training, validation or design had them.",
+            "",
+            *(f"- {_said(who, rows, k)}" for k, who in enumerate(whom) if k),
+            "- A small error does not say what a hand feels; in a clone, `birthsim study haptics` measures that.",
+            "- It is a policy of a simulation. No real rig has run it, and it is no medical device.",
+            "",
+            f"      birthsim evaluate --controller {' '.join(whom[1:])} residual --policy FOLDER --sensors {about['sensors']}",
+            "",
+        ]
+    )
 
 
 def settings_of(folder: Path) -> dict[str, Any]:

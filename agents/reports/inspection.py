@@ -51,18 +51,30 @@ RIGS = 4
 
 
 def _follow(
-    policy: PolicyFunction, settings: ResidualSettings, lanes: int, seconds: float, trajectory: Trajectory,
-    ranges: dict[str, tuple[float, float]], rig: Parameters,
-) -> tuple[Any, dict[str, Array]]:  # fmt: skip
+    policy: PolicyFunction,
+    settings: ResidualSettings,
+    lanes: int,
+    seconds: float,
+    trajectory: Trajectory,
+    ranges: dict[str, tuple[float, float]],
+    rig: Parameters,
+) -> tuple[Any, dict[str, Array]]:
     """Lanes without a hand at 2000 N/m under the policy; the environment, and by name what was at each of T steps, (T, N, 2).
 
     ``correction`` is the believed force, N; the others are of ``info``.
     """
     env: Any = gymnasium.make_vec(
-        "BirthSIM/ProbeResidual-v2", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
-        stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, autoreset_mode="SameStep",
+        "BirthSIM/ProbeResidual-v2",
+        num_envs=lanes,
+        reference=trajectory,
+        user_force=ForceProfile(),
+        parameters=rig,
+        stiffness=StiffnessSchedule(),
+        randomize=ranges or False,
+        duration=seconds,
+        autoreset_mode="SameStep",
         **settings.to_dict(),
-    )  # fmt: skip
+    )
     rows = [k for k, name in enumerate(env.observation_names) if name.startswith("smoothed action: believed force")]
     taken: dict[str, list[Array]] = {
         name: [] for name in ("correction", "piston_position", "piston_velocity", "tracking_error")

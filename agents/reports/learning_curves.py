@@ -49,10 +49,11 @@ def over_seeds(trainings: Sequence[dict[str, Any]], figure: str) -> tuple[Array,
         [[_number(point[figure]) for point in training["curve"][:length]] for training in trainings], dtype=np.float64
     )
     rows = [
-        (interquartile_mean(column), *crossed_interval(interquartile_mean, column[:, None])) if np.isfinite(column).all()
+        (interquartile_mean(column), *crossed_interval(interquartile_mean, column[:, None]))
+        if np.isfinite(column).all()
         else (np.nan,) * 3
         for column in values.T
-    ]  # fmt: skip
+    ]
     return steps, np.array(rows).T
 
 

@@ -203,12 +203,19 @@ class ResidualLaw(StagedController):
     def law_stages(self, sampled: bool) -> list[LawStage]:
         settings, board = self.settings, self.parameters.electronics
         constants = Constants.numbers(
-            actions=settings.size, authority=settings.authority, time_constant=settings.time_constant, level=authority.LEVEL,
-            unit=FORCE_UNIT, has_law=self._law is not None, period=board.control_period, rig=self._p,
+            actions=settings.size,
+            authority=settings.authority,
+            time_constant=settings.time_constant,
+            level=authority.LEVEL,
+            unit=FORCE_UNIT,
+            has_law=self._law is not None,
+            period=board.control_period,
+            rig=self._p,
             quickness=1.0 - exact.number("exp", -board.control_period / settings.time_constant),
-            stiffens=settings.impedance != "fixed", damps=settings.impedance == "variable",
+            stiffens=settings.impedance != "fixed",
+            damps=settings.impedance == "variable",
             told=insight.Insight.size if settings.informed else 0,
-        )  # fmt: skip
+        )
         own = LawStage(_stage, constants, Memory.lane(limiter=authority.Limiter.lane(left=1.0)))
         known = [observed(self.parameters, sampled)]
         if settings.informed:

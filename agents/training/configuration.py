@@ -79,17 +79,21 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         for name, allowed in (
-            ("algorithm", ALGORITHMS), ("sensors", tuple(SENSORS)), ("randomize", RANDOMIZE),
-            ("privileged", (True, False)), ("target", TARGETS),
-        ):  # fmt: skip
+            ("algorithm", ALGORITHMS),
+            ("sensors", tuple(SENSORS)),
+            ("randomize", RANDOMIZE),
+            ("privileged", (True, False)),
+            ("target", TARGETS),
+        ):
             one_of(name, getattr(self, name), allowed)
         if not isinstance(self.environment, str):
             raise ValueError(f"environment = {shown(self.environment)}; allowed: the id of a residual environment")
         for name, (few, many) in COUNTS.items():
             object.__setattr__(self, name, checked_count(name, getattr(self, name), few, many))
         for name, unit, low, high in (
-            *((name, "-", 0.0, 1.0) for name in ("learning_rate", "discount", "gae_lambda")), ("until", "%", 0.0, 100.0),
-        ):  # fmt: skip
+            *((name, "-", 0.0, 1.0) for name in ("learning_rate", "discount", "gae_lambda")),
+            ("until", "%", 0.0, 100.0),
+        ):
             checked_number(name, getattr(self, name), unit, above=low, most=high)
         checked_number("log_std", self.log_std, "-", least=-20.0, most=2.0)
         checked_number("margin", self.margin, "-", least=0.0, most=1.0)

@@ -28,9 +28,14 @@ class Reached:
     """
 
     def __init__(
-        self, settings: TrainingSettings, residual: ResidualSettings, envs: Sequence[Any], folder: Path,
-        past: dict[str, Any] | None, paper: Sequence[Any] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        settings: TrainingSettings,
+        residual: ResidualSettings,
+        envs: Sequence[Any],
+        folder: Path,
+        past: dict[str, Any] | None,
+        paper: Sequence[Any] | None = None,
+    ) -> None:
         self._settings, self._residual, self.envs, self._folder = settings, residual, envs, folder
         if past is None:
             self.figures: dict[str, Any] = {"law": self._without_policy(envs), "policy": None, "curve": []}

@@ -104,9 +104,13 @@ def teach(teacher: Policy, lessons: Lessons, parameters: Parameters) -> Iterator
 def _worlds(teacher: Policy, lanes: int, parameters: Parameters) -> Any:
     its = {name: teacher.training[name] for name in ("sensors", "randomize")}
     return gymnasium.make_vec(
-        teacher.environment, num_envs=lanes, parameters=parameters, autoreset_mode=AutoresetMode.SAME_STEP, **its,
+        teacher.environment,
+        num_envs=lanes,
+        parameters=parameters,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+        **its,
         **teacher.settings.to_dict(),
-    )  # fmt: skip
+    )
 
 
 def _round(env: Any, teacher: Policy, network: PolicyNetwork, seed: int, shown: bool) -> Round:

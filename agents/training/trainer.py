@@ -81,9 +81,13 @@ def train(
         done = min(learner.steps, settings.steps)
         print(f"seed {settings.seed}: {done:,} of {settings.steps:,} steps are there and are kept")
     bar = tqdm(
-        total=settings.steps, initial=min(learner.steps, settings.steps), desc=f"seed {settings.seed}", unit=" steps",
-        unit_scale=True, position=position,
-    )  # fmt: skip
+        total=settings.steps,
+        initial=min(learner.steps, settings.steps),
+        desc=f"seed {settings.seed}",
+        unit=" steps",
+        unit_scale=True,
+        position=position,
+    )
     try:
         reached = Reached(settings, residual, checks, folder, past, paper)
         if learner.steps < settings.steps and not reached.enough:

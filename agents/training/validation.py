@@ -95,14 +95,18 @@ def joined(scores: Sequence[Score]) -> Score:
         return np.concatenate([getattr(one, name) for one in scores])
 
     return Score(
-        every("error"), every("stiffness"), every("hunting"), every("saturation"), every("required_strength_ratio"),
+        every("error"),
+        every("stiffness"),
+        every("hunting"),
+        every("saturation"),
+        every("required_strength_ratio"),
         sum(one.lost for one in scores),
-    )  # fmt: skip
+    )
 
 
 def validate(
     env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed: int = VALIDATION_SEED, target: str = TARGETS[0]
-) -> Score:  # fmt: skip
+) -> Score:
     """Run one episode in every lane of a residual vector environment under ``act``: observations (N, D) -> actions (N, size).
 
     ``act`` stands at the beginning of an episode. Figures are sampled once per policy step. Where the ``target`` is the

@@ -110,9 +110,13 @@ class AdmittanceController(StagedController):
     }
 
     def __init__(
-        self, parameters: Parameters | str | Path | None = None, force_sensor: bool = True, learn: bool = True,
-        identified: bool = False, **gains: float,
-    ) -> None:  # fmt: skip
+        self,
+        parameters: Parameters | str | Path | None = None,
+        force_sensor: bool = True,
+        learn: bool = True,
+        identified: bool = False,
+        **gains: float,
+    ) -> None:
         gains = checked_gains(self, gains)
         check_flags({"force_sensor": force_sensor, "learn": learn, "identified": identified})
         if identified and force_sensor:
@@ -150,12 +154,20 @@ class AdmittanceController(StagedController):
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
         follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
         about = knowledge.beliefs(
-            rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=(sampled and self._learn) or weighed,
-            place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
-            identified=self._identified, learns_mass=sampled and learns_force, weighed=weighed,
+            rig,
+            sampled,
+            noisy,
+            g,
+            force_sensor=self._force_sensor,
+            learns_noise=(sampled and self._learn) or weighed,
+            place=HANDED if inert else POSITION,
+            friction_rate=g["friction_rate"] if learns_force else 0.0,
+            identified=self._identified,
+            learns_mass=sampled and learns_force,
+            weighed=weighed,
             believed_limit=knowledge.BELIEVED_LIMIT if inert or fixed else knowledge.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
-        )  # fmt: skip
+        )
         constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
         own = LawStage(law.control, constants, knowledge.fresh_memory(rig, sampled))
         return [inertial.law_stage(rig), own] if inert else [own]

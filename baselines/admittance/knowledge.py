@@ -89,9 +89,15 @@ def correct(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         disturbance_observer.observe(pistons, point, memory.chambers.pressure, given, belief, joints, lanes)
     for i in range(lanes):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
-            p.sin_gamma3, p.cos_gamma3,
-        )  # fmt: skip
+            joints.position[0, i],
+            joints.position[1, i],
+            p.k1,
+            p.k2,
+            p.d_squares,
+            p.d_product,
+            p.sin_gamma3,
+            p.cos_gamma3,
+        )
         mass = memory.inertia.mass[i]
         for k in range(2):
             found = (mass * kappa * kappa if k == 0 else mass) * pistons.disturbance[k, i]

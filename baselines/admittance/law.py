@@ -148,7 +148,7 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         rate1 += p.fv1 * mechanics.acceleration1(
             load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, inverse_mass, gravity
-        )  # fmt: skip
+        )
         rate2 += p.fv2 * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, inverse_mass, gravity)
         rate1, rate2 = rate1 - feedforward.rate[0, i], rate2 - feedforward.rate[1, i]
         stiffness, stiffness_rate = asked.pneumatic_stiffness, asked.pneumatic_stiffness_rate

@@ -144,10 +144,14 @@ class BacksteppingController(StagedController):
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
         self._options = Options.numbers(
-            pneumatic_gain=pneumatic_gain, sign_width=sign_width, weight=self.weight_compensation,
-            coulomb_rate=not frozen_friction, damping_ratio=damping_ratio or 0.0, one_valve=valves == "one_valve",
+            pneumatic_gain=pneumatic_gain,
+            sign_width=sign_width,
+            weight=self.weight_compensation,
+            coulomb_rate=not frozen_friction,
+            damping_ratio=damping_ratio or 0.0,
+            one_valve=valves == "one_valve",
             force_first=self.force_first,
-        )  # fmt: skip
+        )
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
@@ -201,6 +205,4 @@ class BacksteppingController(StagedController):
         _inspect(seen, joints, Rig(self._p), Options(self._options), terms)
         gains, rates = (one.rows.reshape(3, 2, lanes) for one in (terms.gains, terms.gain_rates))
         intent = terms.intent
-        return LawTerms(
-            joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate
-        )  # fmt: skip
+        return LawTerms(joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate)

@@ -133,7 +133,7 @@ def least_damping(stiffness: float, apparent_mass: float, viscous: float) -> flo
 
 def gains_for(
     stiffness: float, apparent_mass: float, viscous: float, damping: float | None = None
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """Positive gains c1, c2, c3 (1/s) that render ``stiffness`` (N/m) and, where given, ``damping`` (N s/m).
 
     Without a damping they are equal; with one their sum is as small as c1 = c3 allows. Raises ``ValueError`` for arguments that

@@ -86,9 +86,14 @@ class Evaluation:
 
 @spelled_out(*GIVEN)
 def evaluate(
-    environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True,
+    environment: str,
+    controller: Controller | Law,
+    name: str,
+    episodes: int,
+    seed: int,
+    progress: bool = True,
     **arguments: Unpack[Arguments],
-) -> Evaluation:  # fmt: skip
+) -> Evaluation:
     """Run ``episodes`` episodes of a registered id under a controller, or a function of measurement and reference, which
     commands at every control period.
 
@@ -101,9 +106,14 @@ def evaluate(
 
 
 def evaluate_worlds(
-    environment: str, controller: Controller | Law, name: str, seeds: Sequence[int], rigs: Array | None, progress: bool = True,
+    environment: str,
+    controller: Controller | Law,
+    name: str,
+    seeds: Sequence[int],
+    rigs: Array | None,
+    progress: bool = True,
     **arguments: Unpack[Arguments],
-) -> Evaluation:  # fmt: skip
+) -> Evaluation:
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
     refuse_unknown(arguments, ("device", "max_episode_steps"), GIVEN)
     if arguments.get("device") is not None:
@@ -147,9 +157,15 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
 
 
 def _run_batch(
-    environment: str, controller: Controller, seeds: list[int], rigs: Array | None, arguments: Arguments,
-    result: Evaluation, spent: list[float], progress: bool,
-) -> None:  # fmt: skip
+    environment: str,
+    controller: Controller,
+    seeds: list[int],
+    rigs: Array | None,
+    arguments: Arguments,
+    result: Evaluation,
+    spent: list[float],
+    progress: bool,
+) -> None:
     period = load_parameters(arguments.get("parameters")).electronics.control_period
     driver = driving(controller, result.controller)
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)

@@ -41,9 +41,14 @@ def file_stem(name: str) -> str:
 
 
 def evaluation_tasks(
-    label: str, settings: dict[str, Any], environment: str, world: dict[str, Any], episodes: int, seed: int,
+    label: str,
+    settings: dict[str, Any],
+    environment: str,
+    world: dict[str, Any],
+    episodes: int,
+    seed: int,
     work: Callable[..., Result] | None = None,
-) -> list[Task]:  # fmt: skip
+) -> list[Task]:
     """The pieces of an evaluation of the controller with these ``controller_settings``, seeds ``seed``, ``seed`` + 1, ...
 
     ``world`` holds the environment's arguments as JSON takes them, the rig only where it is not as believed;
@@ -52,20 +57,32 @@ def evaluation_tasks(
     hashes = [file_hash(value) for value in world.values() if isinstance(value, str)]
     return [
         Task(
-            f"pieces/{file_stem(label)}/{first}", work or evaluate_piece,
+            f"pieces/{file_stem(label)}/{first}",
+            work or evaluate_piece,
             {
-                **settings, "environment": environment, "world": world, "files": hashes, "seed": first,
+                **settings,
+                "environment": environment,
+                "world": world,
+                "files": hashes,
+                "seed": first,
                 "episodes": min(EPISODES, seed + episodes - first),
             },
         )
         for first in range(seed, seed + episodes, EPISODES)
-    ]  # fmt: skip
+    ]
 
 
 def evaluate_piece(
-    controller: str, source: str, rig: dict[str, Any], environment: str, world: dict[str, Any], files: list[str], seed: int,
-    episodes: int, **options: Any,
-) -> Result:  # fmt: skip
+    controller: str,
+    source: str,
+    rig: dict[str, Any],
+    environment: str,
+    world: dict[str, Any],
+    files: list[str],
+    seed: int,
+    episodes: int,
+    **options: Any,
+) -> Result:
     """One piece; ``options`` go to the controller's constructor, ``source`` and ``files`` only tell pieces apart.
 
     ``rig`` is what the controller believes, and where ``world`` has no ``parameters`` it is so.
@@ -92,10 +109,16 @@ def gathered(name: str, results: Sequence[Result]) -> Evaluation:
 def _evaluation(result: Result) -> Evaluation:
     flat = np.frombuffer(base64.b64decode(result["trace"]["float32"]), dtype="<f4")
     return Evaluation(
-        "", result["seeds"], {name: _numbers(values) for name, values in result["metrics"].items()}, result["lost"],
-        result["required_strength_ratio"], {float(key): _numbers(values) for key, values in result["returns"].items()},
-        result["success"], result["cost"], [flat.reshape(result["trace"]["shape"]).astype(np.float64)],
-    )  # fmt: skip
+        "",
+        result["seeds"],
+        {name: _numbers(values) for name, values in result["metrics"].items()},
+        result["lost"],
+        result["required_strength_ratio"],
+        {float(key): _numbers(values) for key, values in result["returns"].items()},
+        result["success"],
+        result["cost"],
+        [flat.reshape(result["trace"]["shape"]).astype(np.float64)],
+    )
 
 
 def _numbers(values: list[float | None]) -> list[float]:

@@ -33,10 +33,17 @@ class RestingRigs(Simulation):
     """
 
     def __init__(
-        self, rigs: Sequence[Parameters], reference: Reference, controller: Controller, sensors: str = "ideal", seed: int = 0,
-        force_sensor: bool = True, moved: Sequence[Parameters] | None = None, name: str | None = None,
+        self,
+        rigs: Sequence[Parameters],
+        reference: Reference,
+        controller: Controller,
+        sensors: str = "ideal",
+        seed: int = 0,
+        force_sensor: bool = True,
+        moved: Sequence[Parameters] | None = None,
+        name: str | None = None,
         options: dict[str, Array] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         lanes, still = len(rigs), (Trajectory(), UserForce(), StiffnessSchedule())
         law = driving(controller, name, options)
         super().__init__(lanes, rigs[0], {}, *still, sensors, law, 1, available_threads(), force_sensor)

@@ -31,11 +31,19 @@ def program(name: str, settings: type[S], example: str = "") -> App:
     """What reads the settings of the command ``name`` and returns them; its help ends with the example."""
     about = "\n\n".join(" ".join(part.split()) for part in (settings.__doc__ or "").split("\n\n"))
     app = App(
-        name=name, help=about, help_format="plaintext", help_epilogue=f"example: {example}" if example else None,
-        default_parameter=Parameter(negative=(), negative_iterable=(), show_default=_default), version_flags=(),
-        config=_file if issubclass(settings, Configured) else None, result_action="return_value",
-        exit_on_error=False, print_error=False, verbose=False, suppress_keyboard_interrupt=False,
-    )  # fmt: skip
+        name=name,
+        help=about,
+        help_format="plaintext",
+        help_epilogue=f"example: {example}" if example else None,
+        default_parameter=Parameter(negative=(), negative_iterable=(), show_default=_default),
+        version_flags=(),
+        config=_file if issubclass(settings, Configured) else None,
+        result_action="return_value",
+        exit_on_error=False,
+        print_error=False,
+        verbose=False,
+        suppress_keyboard_interrupt=False,
+    )
     app["--help"].show = False
     app.default(settings)
     return app

@@ -90,11 +90,12 @@ Set = Annotated[
     list[str],
     MANY,
     Parameter(
-        group=CONTROL, metavar="GAIN=VALUE...",
+        group=CONTROL,
+        metavar="GAIN=VALUE...",
         help="Gains and other options of every controller named that has them, such as bandwidth=60; for one of them alone "
         "write 'pid[bandwidth=60]' as its name.",
     ),
-]  # fmt: skip
+]
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
 """``Randomize`` -> the environments' argument ``randomize``."""
@@ -111,8 +112,9 @@ class Configured:
         """What results depend on, as JSON."""
         return {
             name: value if value is None or isinstance(value, bool | int | list) else str(value)
-            for name, value in vars(self).items() if name not in ("out", "jobs", "cluster", "config")
-        }  # fmt: skip
+            for name, value in vars(self).items()
+            if name not in ("out", "jobs", "cluster", "config")
+        }
 
 
 @dataclass(kw_only=True)
@@ -122,21 +124,23 @@ class Parts(Configured):
     reference: Annotated[
         str | None,
         Parameter(
-            group=WORLD, metavar="PART",
+            group=WORLD,
+            metavar="PART",
             help="A CSV file of time, x, y (s, m, m), FILE:t,a,b where its heading calls them so, or path/to/file.py:Name of a "
             "birthsim_env.Trajectory or of a function of time that returns (x, y).",
         ),
-    ] = None  # fmt: skip
+    ] = None
     stiffness: Annotated[str | None, Parameter(group=WORLD, metavar="FILE")] = None
     """CSV file of time, x, y, stiffness (s, m, m, N/m) of the setpoints; --reference takes the same file."""
     user_force: Annotated[
         str | None,
         Parameter(
-            group=WORLD, metavar="PART",
+            group=WORLD,
+            metavar="PART",
             help="The hand: steps, sine, noise, guided, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
             "birthsim_env.UserForce or of a function of time that returns (Fx, Fy).",
         ),
-    ] = None  # fmt: skip
+    ] = None
 
     def parts(self) -> dict[str, Any]:
         """The environments' arguments, as far as they are given."""

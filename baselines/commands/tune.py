@@ -150,7 +150,7 @@ def begun(start: Gains) -> Study:
 
 def search(
     study: Study, folder: Path, setting: dict[str, Any], bounds: Bounds, seed: int, count: int
-) -> Iterator[dict[str, Any]]:  # fmt: skip
+) -> Iterator[dict[str, Any]]:
     """``count`` trials, one by one, as gains, cost and its parts; those of this ``setting`` in ``folder`` are not run again."""
     from optuna.distributions import BaseDistribution, FloatDistribution
     from optuna.samplers import TPESampler

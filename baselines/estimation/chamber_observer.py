@@ -42,9 +42,7 @@ class Chambers(Rows):
 
 
 @helper
-def observe(
-    chambers: Chambers, measured: Array, joints: Joints, p: Rig, period: float, fraction: float, fresh: Array
-) -> None:  # fmt: skip
+def observe(chambers: Chambers, measured: Array, joints: Joints, p: Rig, period: float, fraction: float, fresh: Array) -> None:
     """Carries ``chambers`` on by one period to whose end pressures (4, N), Pa, were ``measured``, with a trust ``fraction`` in
     them.
 
@@ -62,9 +60,14 @@ def observe(
             opening = chambers.opening[chamber, i]
             away = chambers.spool[chamber, i] - opening
             expected = predicted_pressure(
-                chambers.pressure[chamber, i], opening + mean * away, area, half + sign * joints.position[cylinder, i],
-                sign * joints.speed[cylinder, i], period, p,
-            )  # fmt: skip
+                chambers.pressure[chamber, i],
+                opening + mean * away,
+                area,
+                half + sign * joints.position[cylinder, i],
+                sign * joints.speed[cylinder, i],
+                period,
+                p,
+            )
             new, cell = fresh[i] > 0.0, measured[chamber, i]
             chambers.pressure[chamber, i] = cell if new else fraction * cell + (1.0 - fraction) * expected
             chambers.spool[chamber, i] = 0.0 if new else opening + kept * away

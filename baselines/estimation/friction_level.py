@@ -37,7 +37,7 @@ class Friction(Rows):
 @helper
 def learn(
     friction: Friction, drag: Array, joints: Joints, unexplained: Array, rate: float, about: Belief, fresh: Array
-) -> None:  # fmt: skip
+) -> None:
     """Carries ``friction`` on by one period.
 
     ``drag`` (2, N), N, is the believed friction along the reference; ``unexplained`` (2, N), N, is R; ``rate``, a in 1/s.

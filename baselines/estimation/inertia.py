@@ -42,9 +42,15 @@ class Inertia(Rows):
 
 @helper
 def learn(
-    inertia: Inertia, i: int, pose: tuple[float, float, float], pistons: Pistons, pressures: Array, given: Given, about: Belief,
+    inertia: Inertia,
+    i: int,
+    pose: tuple[float, float, float],
+    pistons: Pistons,
+    pressures: Array,
+    given: Given,
+    about: Belief,
     fresh: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Carries lane ``i`` on by one period; ``pose`` is kappa, sin(theta1) and cos(theta1), ``pressures`` (4, N) in Pa."""
     (kappa, sine, cosine), p, period, air = pose, about.rig, about.period, PerChamber(pressures)
     fx, fy, mass = given.force[0, i], given.force[1, i], inertia.mass[i]

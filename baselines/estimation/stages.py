@@ -26,7 +26,7 @@ class Estimate(Rows):
 
 MOTION, MOVING, JOINTS, OWN = (
     HANDED + first for first in (Estimate.motion.first, Estimate.moving.first, Estimate.joints.first, Estimate.size)
-)  # fmt: skip
+)
 
 
 @kernel

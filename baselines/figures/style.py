@@ -90,9 +90,16 @@ def legend_below(figure: Figure, axes: Iterable[Axes] | None = None, said: str =
         columns = max(1, min(4, int(figure.get_figwidth() / column)))
         heading = fill(said, int(17 * figure.get_figwidth())) or None
         figure.legend(
-            list(shown.values()), list(shown), loc="outside lower center", ncol=columns, title=heading,
-            title_fontsize=7, handlelength=2, columnspacing=1.2, borderpad=0.1,
-        )  # fmt: skip
+            list(shown.values()),
+            list(shown),
+            loc="outside lower center",
+            ncol=columns,
+            title=heading,
+            title_fontsize=7,
+            handlelength=2,
+            columnspacing=1.2,
+            borderpad=0.1,
+        )
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:

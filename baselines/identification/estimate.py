@@ -62,9 +62,7 @@ class Problem:
     (Q,) of the search; ``tick`` is called at every evaluation.
     """
 
-    def __init__(
-        self, windows: Windows, noise: Noise, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick
-    ) -> None:  # fmt: skip
+    def __init__(self, windows: Windows, noise: Noise, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick) -> None:
         self.noise, self.quantities, self._owner, self._tick = noise, quantities, owner, tick
         self.centre, self.limits = coordinates(owner, quantities), limits(owner, quantities)
         self.spread: Array = np.array([one.spread for one in quantities])

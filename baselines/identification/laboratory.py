@@ -22,9 +22,14 @@ PNEUMATIC = (4400.0, 2200.0)
 
 
 def run_plan(
-    plan: Plan, rigs: Sequence[Parameters], controller: Controller, sensors: str, seed: int,
-    tick: Callable[[], Any] = lambda: None, carry: Callable[[RestingRigs], Part] | None = None,
-) -> list[Trial]:  # fmt: skip
+    plan: Plan,
+    rigs: Sequence[Parameters],
+    controller: Controller,
+    sensors: str,
+    seed: int,
+    tick: Callable[[], Any] = lambda: None,
+    carry: Callable[[RestingRigs], Part] | None = None,
+) -> list[Trial]:
     """What a log of every rig would hold; rig i has the sensors of ``seed`` + i. ``tick`` is called once per control period.
 
     ``carry`` makes of the rigs at rest what moves in the plant's place.
@@ -35,9 +40,15 @@ def run_plan(
 
 
 def _run(
-    plan: Plan, rig: Parameters, number: int, controller: Controller, sensors: str, seed: int, tick: Callable[[], Any],
+    plan: Plan,
+    rig: Parameters,
+    number: int,
+    controller: Controller,
+    sensors: str,
+    seed: int,
+    tick: Callable[[], Any],
     carry: Callable[[RestingRigs], Part] | None,
-) -> Trial:  # fmt: skip
+) -> Trial:
     # A plan's rows are those of a multisine, which passes them between two of them; cut to its rows it would jerk there.
     rows, path = np.zeros((REFERENCES, 1)), Through(plan.times, plan.target.T, within=False)
     rows[:2], rows[8:10], rows[10:12] = plan.target[:, :1], STIFFNESS, np.transpose([PNEUMATIC])

@@ -55,7 +55,7 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
 @kernel
 def _track(
     state: Array, openings: Array, forces: Array, rows: NDArray[np.int64], parameters: Array, clock: Clock, tracks: Array
-) -> None:  # fmt: skip
+) -> None:
     """Moves ``state`` (18, N) by K periods of a ``clock``, under openings (4, T) and forces (2, T) from
     ``rows`` (N,) on; writes pressures and position of the end effector at every period, ``tracks`` (K + 1, 6, N)."""
     x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))

@@ -65,10 +65,18 @@ class Windows:
     def some(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Windows:
         """The windows with the numbers ``chosen``, or where ``chosen`` (W,) is True."""
         return Windows(
-            self.trial, self.length, self.starts[chosen], self.arrived[chosen], self.valid[chosen], self.pressures[chosen],
-            self.positions[chosen], self.state[:, chosen], self.pressure_weights[chosen], self.position_weights[chosen],
+            self.trial,
+            self.length,
+            self.starts[chosen],
+            self.arrived[chosen],
+            self.valid[chosen],
+            self.pressures[chosen],
+            self.positions[chosen],
+            self.state[:, chosen],
+            self.pressure_weights[chosen],
+            self.position_weights[chosen],
             self.budget,
-        )  # fmt: skip
+        )
 
 
 def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | None = None) -> Windows:
@@ -90,14 +98,21 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
     positions = np.nan_to_num(trial.positions.T[starts[:, None] + arrived])
     known = np.isfinite(pressures)
     return Windows(
-        trial, k, starts, arrived, valid, np.where(known, pressures, 0.0), positions, _guess(trial, rig, starts, fresh),
-        known.astype(np.float64), valid.astype(np.float64), budget or Budget.of(trial),
-    )  # fmt: skip
+        trial,
+        k,
+        starts,
+        arrived,
+        valid,
+        np.where(known, pressures, 0.0),
+        positions,
+        _guess(trial, rig, starts, fresh),
+        known.astype(np.float64),
+        valid.astype(np.float64),
+        budget or Budget.of(trial),
+    )
 
 
-def _measured(
-    trial: Trial, starts: NDArray[np.intp], k: int, lag: int, fresh: NDArray[np.intp]
-) -> NDArray[np.intp]:  # fmt: skip
+def _measured(trial: Trial, starts: NDArray[np.intp], k: int, lag: int, fresh: NDArray[np.intp]) -> NDArray[np.intp]:
     """Those of ``starts`` whose windows of ``k`` rows can be predicted and have more than half of the measurements."""
     lost = _before(np.zeros(len(trial.times), dtype=np.bool_) if trial.unknown is None else trial.unknown)
     ends, settled = starts + k, np.maximum(starts - round(SETTLED / trial.period), 0)

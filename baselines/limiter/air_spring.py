@@ -27,9 +27,17 @@ MEMORY = 1.0
 
 @helper
 def passive_openings(
-    forces: Array, rate: float, pressures: Array, hand: InPlane, here: Joints, there: Joints, seen: Signals, p: Rig,
-    opening: Array, i: int,
-) -> None:  # fmt: skip
+    forces: Array,
+    rate: float,
+    pressures: Array,
+    hand: InPlane,
+    here: Joints,
+    there: Joints,
+    seen: Signals,
+    p: Rig,
+    opening: Array,
+    i: int,
+) -> None:
     """Writes the spool openings (4, N) of lane ``i`` at the signals of now.
 
     ``forces`` (4, N), N, of the chambers that balance the weight, NaN before the first, go on by the fraction ``rate``. The

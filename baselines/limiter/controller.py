@@ -221,13 +221,25 @@ class PortLimiter(StagedController):
             1.0 - exact.number("exp", -period / lag) for lag in (LASTING, RECOVERY, BACK, air_spring.MEMORY)
         )
         about = Limits.numbers(
-            capacity=self._capacity, speed=self._speed, period=period, slots=slots_of(period), lasting=lasting,
-            recovery=recovery, back=back, balance=balance, rig=self._p,
-        )  # fmt: skip
+            capacity=self._capacity,
+            speed=self._speed,
+            period=period,
+            slots=slots_of(period),
+            lasting=lasting,
+            recovery=recovery,
+            back=back,
+            balance=balance,
+            rig=self._p,
+        )
         fresh = Tank.lane(
-            authority=1.0, ceiling=1.0, level=self._capacity, stiffness=np.nan, energy=Energy.lane(stamp=-np.inf),
-            forces=np.nan, past=np.full(Late.size * slots_of(period), np.nan),
-        )  # fmt: skip
+            authority=1.0,
+            ceiling=1.0,
+            level=self._capacity,
+            stiffness=np.nan,
+            energy=Energy.lane(stamp=-np.inf),
+            forces=np.nan,
+            past=np.full(Late.size * slots_of(period), np.nan),
+        )
         return [LawStage(limit, about, fresh)]
 
     def prepare(self, lanes: int, sampled: bool) -> None:

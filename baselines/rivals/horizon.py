@@ -11,6 +11,11 @@ nodes the changes of the commanded flows. Each is divided by its tolerance.
 """
 
 from baselines.valve_inverse import CylinderAir, air_at, stiffness_of
+from birthsim_env.gradients.derivatives import reverse
+from birthsim_env.gradients.graph import Graph, Value
+from birthsim_env.gradients.source import HEAD, loop, module_of
+from birthsim_env.gradients.symbols import empty, inputs
+from birthsim_env.gradients.tracing import call
 from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
@@ -18,11 +23,6 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
 from birthsim_env.physics.dynamics import load
-from birthsim_env.physics.gradients.derivatives import reverse
-from birthsim_env.physics.gradients.graph import Graph, Value
-from birthsim_env.physics.gradients.source import HEAD, loop, module_of
-from birthsim_env.physics.gradients.symbols import empty, inputs
-from birthsim_env.physics.gradients.tracing import call
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 NODES = 7
@@ -189,9 +189,18 @@ def place(row: int, column: int) -> int:
 
 @helper
 def step_to(
-    x: Array, flows: Array, plan: Array, f: Array, p: Array, k: int, about: Horizon, points: Array, total: Array, q: Array,
+    x: Array,
+    flows: Array,
+    plan: Array,
+    f: Array,
+    p: Array,
+    k: int,
+    about: Horizon,
+    points: Array,
+    total: Array,
+    q: Array,
     n: int,
-) -> None:  # fmt: skip
+) -> None:
     """Takes ``x`` (8, n) and ``flows`` (4, n) to node ``k``; ``points`` (STAGES POINT, n) get rates and slopes."""
     step, kept = about.step[k], about.kept[k]
     trial = scratch(STATE)

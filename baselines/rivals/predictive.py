@@ -178,10 +178,13 @@ class NonlinearMPC(StagedController):
         periods = np.maximum(np.round(np.array(STEPS) / period), 1)
         time = periods * period
         horizon = Horizon.numbers(
-            tick=np.cumsum(periods), step=time, kept=np.array([exact.number("exp", -one / 2 / tau) for one in time]),
+            tick=np.cumsum(periods),
+            step=time,
+            kept=np.array([exact.number("exp", -one / 2 / tau) for one in time]),
             weight=np.sqrt(time / NODES_WEIGH * np.where(np.arange(NODES) == NODES - 1, LAST, 1.0)),
-            position=self.POSITION_TOLERANCE, **{name: gains[f"{name}_tolerance"] for name in ("speed", "stiffness", "flow")},
-        )  # fmt: skip
+            position=self.POSITION_TOLERANCE,
+            **{name: gains[f"{name}_tolerance"] for name in ("speed", "stiffness", "flow")},
+        )
         about = Constants.numbers(**knowledge.beliefs(rig, sampled, sampled, gains), horizon=horizon)
         return [LawStage(control, about, np.concatenate([np.zeros(SIZE), knowledge.fresh_memory(rig, sampled)]))]
 

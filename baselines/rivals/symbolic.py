@@ -13,11 +13,11 @@ from typing import Any
 
 from baselines.rivals import horizon
 from birthsim_env.assembly import one_of
+from birthsim_env.gradients.evaluated import carried_out
+from birthsim_env.gradients.graph import Graph
+from birthsim_env.gradients.symbols import empty, inputs
+from birthsim_env.gradients.tracing import call
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Rig, parameter_column
-from birthsim_env.physics.gradients.evaluated import carried_out
-from birthsim_env.physics.gradients.graph import Graph
-from birthsim_env.physics.gradients.symbols import empty, inputs
-from birthsim_env.physics.gradients.tracing import call
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 SYMBOLS = {"x": "y1 y2 v1 v2 Pp1 Pn1 Pp2 Pn2", "q": "qp1 qn1 qp2 qn2", "f": "Fx Fy Fo1 Fo2"}

@@ -135,9 +135,12 @@ def _on_cluster(work: Work, pieces: Pieces, cluster: str) -> Outcomes:
         if address:  # Ray itself would try for minutes
             socket.create_connection((host, int(port)), CONNECTING).close()
         ray.init(
-            address=address or "local", log_to_driver=False, include_dashboard=None if address else False,
-            runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
-        )  # fmt: skip
+            address=address or "local",
+            log_to_driver=False,
+            include_dashboard=None if address else False,
+            runtime_env={"env_vars": ONE_THREAD},
+            configure_logging=False,
+        )
     except (OSError, ValueError) as error:
         said = f"--cluster {cluster!r}: no cluster answers there ({error}); allowed: ray, or ray:HOST:PORT of one"
         raise ValueError(said) from error

@@ -22,9 +22,9 @@ from birthsim_build.code.threads import Threads
 from birthsim_build.code.tools import run_tool
 from birthsim_build.image import Words
 from birthsim_env.extras import installation
+from birthsim_env.gradients.source import TEXTS
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.sources import source_stamp
-from birthsim_env.physics.gradients.source import TEXTS
 
 ONE_LANE = {
     **{"BIRTHSIM_BLOCK": "1", "NUMBA_LOOP_VECTORIZE": "0", "NUMBA_SLP_VECTORIZE": "0"},
@@ -42,9 +42,13 @@ EMULATIONS = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}
 
 
 def compile_object(
-    functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False,
+    functions: Sequence[str],
+    target: str,
+    out: Path,
+    data: Mapping[str, Words] | None = None,
+    count: bool = False,
     threads: Threads | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write the object file ``out`` of stages (``module:name``), ``birthsim_advance`` and constant arrays of words.
 
     For a Cortex-M7 the assembly stands beside it, ``.s``; for PTX the text, ``.ptx``, stands in its place. Where it is to
@@ -70,9 +74,11 @@ def _compiled(request: dict[str, Any], arrays: dict[str, Words]) -> dict[str, by
         np.savez(place, **arrays)  # type: ignore[arg-type]
         subprocess.run(
             [sys.executable, "-m", "birthsim_build.code.emit"],
-            input=json.dumps({**request, "data": str(place), "out": str(out)}), text=True, check=True,
+            input=json.dumps({**request, "data": str(place), "out": str(out)}),
+            text=True,
+            check=True,
             env={**os.environ, **ONE_LANE},
-        )  # fmt: skip
+        )
         return {path.suffix: path.read_bytes() for path in Path(folder).glob("code.*")}
 
 

@@ -50,9 +50,10 @@ def _with_counters(block: list[str], number: int) -> list[str]:
             place = f"getelementptr inbounds ([{len(OPERATIONS)} x i64], ptr @{COUNTS}, i64 0, i64 {k})"
             name = f"%count.{number}.{kind}"
             added += [
-                f"  {name} = load i64, ptr {place}", f"  {name}.more = add i64 {name}, {count}",
+                f"  {name} = load i64, ptr {place}",
+                f"  {name}.more = add i64 {name}, {count}",
                 f"  store i64 {name}.more, ptr {place}",
-            ]  # fmt: skip
+            ]
     return [*block[:phis], *added, *block[phis:]]
 
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.program import Key, key_of
+from birthsim_env.gradients.graph import Graph
+from birthsim_env.gradients.source import Output, loop, module_of
+from birthsim_env.gradients.symbols import Unknown
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.randomization import draw_rig
 from birthsim_env.parts.drawn.seeding import STREAMS, is_vectorised
 from birthsim_env.physics.compiled.lanes import Array, rows_of
-from birthsim_env.physics.gradients.graph import Graph
-from birthsim_env.physics.gradients.source import Output, loop, module_of
-from birthsim_env.physics.gradients.symbols import Unknown
 from birthsim_env.simulation import Simulation
 
 HEAD = '''"""Generated: what an episode draws."""
@@ -29,7 +29,7 @@ from birthsim_env.loop.stage import scratch, table2
 from birthsim_env.loop.world import Start
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.gradients.source import choose
+from birthsim_env.gradients.source import choose
 
 '''
 

@@ -24,9 +24,15 @@ from birthsim_env.physics.rig.parameters import load_parameters
 
 @spelled_out("policy_period", "actuation")
 def evaluate_on(
-    device: str, environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True,
+    device: str,
+    environment: str,
+    controller: Controller | Law,
+    name: str,
+    episodes: int,
+    seed: int,
+    progress: bool = True,
     **arguments: Unpack[Arguments],
-) -> Evaluation:  # fmt: skip
+) -> Evaluation:
     """``evaluate`` on a ``device``: equal in every bit, but that ``traces`` are one. ``cost`` is the controller's time here.
 
     Worlds are drawn here. Raises ``ValueError`` for a controller, or an argument of the environment, that is not compiled.

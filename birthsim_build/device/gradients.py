@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from birthsim_build.device.lanes import Lanes
-from birthsim_env.gradients import Pullback, Recorder, weigh
+from birthsim_env.gradients.recorder import Pullback, Recorder, weigh
 from birthsim_env.loop.rows import MOTION
 from birthsim_env.physics.compiled.lanes import PARAMETERS
 

@@ -7,7 +7,7 @@ import numpy as np
 from birthsim_build.code.threads import MISSED
 from birthsim_build.device.machine import Machine
 from birthsim_build.device.program import Pieces, Program, program_of
-from birthsim_env.loop.gradients.taped import TapedLoop
+from birthsim_env.gradients.taped import TapedLoop
 
 
 class Lanes:

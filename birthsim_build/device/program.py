@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from birthsim_build.code.tape import ABOUT, CLOSING, LIVE, OPEN
 from birthsim_build.code.threads import COUNT, FILL, HEAD, IN_DATA, IN_PROGRAM, MAGIC, MOVE, RELOCATION, STAGE, TIMES, Threads
 from birthsim_build.image import Words, function_name
-from birthsim_env.loop.gradients.taped import TapedLoop
+from birthsim_env.gradients.taped import TapedLoop
 from birthsim_env.loop.loop import Place
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import TABLE, Stage

@@ -42,8 +42,12 @@ def write_fmu(model: Model, version: int, path: Path, targets: Sequence[str] = (
                     *("cc", "-target", name_of_zig, "-shared", "-fPIC", "-O2", "-std=c99", "-fno-strict-aliasing"),
                     *("-ffp-contract=off", "-fvisibility=hidden", "-s"),
                     *(f"-I{headers}" for headers in (HERE / "fmi_headers", HERE / "c", place)),
-                    *map(str, sources), str(place / f"{target}.o"), "-lm", "-o", str(binary),
-                )  # fmt: skip
+                    *map(str, sources),
+                    str(place / f"{target}.o"),
+                    "-lm",
+                    "-o",
+                    str(binary),
+                )
                 _put(archive, f"binaries/{three if version == 3 else two}/{binary.name}", binary.read_bytes())
 
 

@@ -69,7 +69,9 @@ ON_FAULT = {"hold": 0.0, "vent": -1.0}
 """What the valves get once the control has ended: closed, or all chambers to the exhaust (a 5/3 valve cannot, and closes)."""
 
 FAULT_TIME = 0.03
-"""s, by default; measured by ``python -m studies.missing_samples --lanes 32``: 95 of 100 heads stray by some 5 mm at most."""
+"""s, by default: 95 of 100 heads stray by some 5 mm at most.
+
+Measured by ``python -m lab.studies.missing_samples --lanes 32``."""
 
 STIFFNESS, PNEUMATIC = 2000.0, (3600.0, 1800.0)
 """N/m; assumed: what is asked for until something good is."""
@@ -201,9 +203,11 @@ def limits(rig: Parameters, reads: Iterable[str], on_fault: str, fault_time: flo
     period = rig.electronics.control_period
     return Limits.numbers(
         most=np.concatenate([np.full(group.count, most[name]) for name, group in Signals.groups.items()]),
-        needed=[float(signal in set(reads)) for signal in SIGNALS], patience=round(fault_time / period),
-        opening=ON_FAULT[on_fault], period=period,
-    )  # fmt: skip
+        needed=[float(signal in set(reads)) for signal in SIGNALS],
+        patience=round(fault_time / period),
+        opening=ON_FAULT[on_fault],
+        period=period,
+    )
 
 
 def fresh(rig: Parameters) -> Array:

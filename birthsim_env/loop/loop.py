@@ -59,7 +59,7 @@ def run_stage(stages: NDArray[np.int64], s: int, base: np.int64, start: int, n: 
 @kernel
 def _run(
     moves: NDArray[np.int64], stages: NDArray[np.int64], rows: int, lanes: int, periods: int, first: int, last: int
-) -> int:  # fmt: skip
+) -> int:
     """``moves`` (M, 4): address of an array, its rows, its first row in a block, whether it is written. ``stages`` (S, 7):
     address of the function; rows at which world, seen and memory begin (-1: none); addresses of constants and tables; 1 for a
     closing stage."""

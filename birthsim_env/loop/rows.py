@@ -109,6 +109,12 @@ def measurement_of(rows: Array, sampled: bool, has_acceleration: bool) -> Measur
     """The measurement in a copy of the rows of ``Signals``, with an acceleration where a sensor measures it."""
     seen = Signals(rows.copy())
     return Measurement(
-        seen.time, seen.position, seen.position_time, seen.velocity, seen.pressure, seen.user_force, sampled,
+        seen.time,
+        seen.position,
+        seen.position_time,
+        seen.velocity,
+        seen.pressure,
+        seen.user_force,
+        sampled,
         seen.acceleration if has_acceleration else None,
-    )  # fmt: skip
+    )

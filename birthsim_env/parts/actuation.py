@@ -97,9 +97,16 @@ def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: i
                 half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
                 y = max(-0.95 * half, min(0.95 * half, state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]))
                 opened = valves.opening_for_active_flow(
-                    full * wanted[cylinder, i], fill_p, drain_p, fill_n, drain_n, half / (half + y), half / (half - y),
-                    p[at.CONDUCTANCE, i], p[at.LEAKAGE, i],
-                )  # fmt: skip
+                    full * wanted[cylinder, i],
+                    fill_p,
+                    drain_p,
+                    fill_n,
+                    drain_n,
+                    half / (half + y),
+                    half / (half - y),
+                    p[at.CONDUCTANCE, i],
+                    p[at.LEAKAGE, i],
+                )
                 openings[chamber_p, i], openings[chamber_n, i] = opened, -opened
             else:
                 flow_p, flow_n = full * wanted[chamber_p, i], full * wanted[chamber_n, i]

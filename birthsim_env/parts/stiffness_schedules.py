@@ -57,9 +57,13 @@ class StiffnessSchedule:
         transition: float = 0.5,
     ) -> None:
         for name, column in (
-            ("times", times), ("closed_loop", closed_loop), ("pneumatic1", pneumatic1), ("pneumatic2", pneumatic2),
-            ("closed_loop_y", closed_loop_y), ("closed_loop_xy", closed_loop_xy),
-        ):  # fmt: skip
+            ("times", times),
+            ("closed_loop", closed_loop),
+            ("pneumatic1", pneumatic1),
+            ("pneumatic2", pneumatic2),
+            ("closed_loop_y", closed_loop_y),
+            ("closed_loop_xy", closed_loop_xy),
+        ):
             optional = name in ("closed_loop_y", "closed_loop_xy")
             if not (isinstance(column, (tuple, list)) or (optional and column is None)):
                 raise ValueError(f"{name} = {shown(column)}; allowed: a tuple with an entry per phase")

@@ -80,9 +80,16 @@ def stiffness_drift(
 
 @helper
 def stiffness_rate(
-    force: float, stiffness: float, speed: float, active: float, pressurization: float, length_p: float, length_n: float,
-    index: float, gas_t: float,
-) -> float:  # fmt: skip
+    force: float,
+    stiffness: float,
+    speed: float,
+    active: float,
+    pressurization: float,
+    length_p: float,
+    length_n: float,
+    index: float,
+    gas_t: float,
+) -> float:
     """dK/dt of (10), N/(m s); ``force`` is Pp Sp - Pn Sn."""
     drift = stiffness_drift(force, stiffness, speed, active, length_p, length_n, index, gas_t)
     return (drift + index * index * gas_t * pressurization) / (length_p * length_n)

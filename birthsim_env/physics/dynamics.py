@@ -27,10 +27,10 @@ def driving_flows(p: Array, i: int, pressure: float, inverse: float, inside: flo
     outer, rho0, critical, knee, slope = p[at.COLDNESS, i], p[at.RHO0, i], p[at.CRITICAL, i], p[at.KNEE, i], p[at.LAMINAR, i]
     fill = valves.driving_flow(
         p[at.SUPPLY, i], p[at.INVERSE_SUPPLY, i], outer, pressure, inverse, inside, rho0, critical, knee, slope
-    )  # fmt: skip
+    )
     drain = valves.driving_flow(
         pressure, inverse, inside, p[at.ATMOSPHERE, i], p[at.INVERSE_ATMOSPHERE, i], outer, rho0, critical, knee, slope
-    )  # fmt: skip
+    )
     return fill, drain
 
 
@@ -54,9 +54,19 @@ def flows_of(x: Array, p: Array, i: int, pressure: int, temperature: int, spool:
 
 @helper
 def chamber_rates(
-    x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, spool: int, area: int, perimeter: int,
-    length: float, length_rate: float,
-) -> None:  # fmt: skip
+    x: Array,
+    p: Array,
+    dx: Array,
+    i: int,
+    pressure: int,
+    temperature: int,
+    other: int,
+    spool: int,
+    area: int,
+    perimeter: int,
+    length: float,
+    length_rate: float,
+) -> None:
     """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
     t = x[temperature, i]
     volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
@@ -69,9 +79,21 @@ def chamber_rates(
 
 @helper
 def exchange(
-    x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, area: int, perimeter: int,
-    length: float, length_rate: float, supplied: float, exhausted: float, inverse: float,
-) -> None:  # fmt: skip
+    x: Array,
+    p: Array,
+    dx: Array,
+    i: int,
+    pressure: int,
+    temperature: int,
+    other: int,
+    area: int,
+    perimeter: int,
+    length: float,
+    length_rate: float,
+    supplied: float,
+    exhausted: float,
+    inverse: float,
+) -> None:
     """``chamber_rates`` under given flows from the supply and to the atmosphere, kg/s; ``inverse`` is 1/(P V T)."""
     t, wall, gas = x[temperature, i], p[at.TEMPERATURE, i], p[at.GAS, i]
     carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
@@ -219,9 +241,18 @@ def steps_in(time: float) -> int:
 
 @helper
 def integrate(
-    x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, dx: Array, total: Array, trial: Array,
+    x: Array,
+    u: Array,
+    f: Array,
+    p: Array,
+    steps: int,
+    step: float,
+    impacts: Array,
+    dx: Array,
+    total: Array,
+    trial: Array,
     n: int,
-) -> None:  # fmt: skip
+) -> None:
     """Integrates ``n`` lanes of a state ``x`` by ``steps`` classical Runge-Kutta steps of ``step`` s under constant inputs.
 
     ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop; the rest is scratch (18, n).

@@ -33,9 +33,14 @@ class Electronics(Part):
     )
 
     force_noise: float = quantity(
-        0.1, "N", "assumed; standard deviation per axis and period, six-axis strain gauges of 300 N", least=0, most=100,
-        randomized=(0.03, 0.3), option=True,
-    )  # fmt: skip
+        0.1,
+        "N",
+        "assumed; standard deviation per axis and period, six-axis strain gauges of 300 N",
+        least=0,
+        most=100,
+        randomized=(0.03, 0.3),
+        option=True,
+    )
     force_bias: float = quantity(
         1.0, "N", f"assumed, drift since it was tared; {NO_LARGER}", least=0, most=1e3, randomized=(0, 2), option=True
     )
@@ -43,9 +48,14 @@ class Electronics(Part):
         0.01, "-", f"assumed, uncertainty of calibration; {NO_LARGER}", least=0, most=0.9, randomized=(0, 0.05), option=True
     )
     force_crosstalk: float = quantity(
-        0.01, "-", f"assumed, below 2 % in good six-axis sensors; of the other axis, {NO_LARGER}", least=0, most=0.9,
-        randomized=(0, 0.03), option=True,
-    )  # fmt: skip
+        0.01,
+        "-",
+        f"assumed, below 2 % in good six-axis sensors; of the other axis, {NO_LARGER}",
+        least=0,
+        most=0.9,
+        randomized=(0, 0.03),
+        option=True,
+    )
     force_bandwidth: float = quantity(
         200.0, "Hz", "assumed; -3 dB of a first-order low-pass", least=0, most=1e5, randomized=(100, 500), option=True
     )
@@ -55,13 +65,23 @@ class Electronics(Part):
     force_range: float = quantity(300.0, "N", "assumed; full scale per axis, either way", above=0, most=1e6, option=True)
 
     position_noise_growth: float = quantity(
-        4.0, "-", "of a magnetic dipole, whose gradient falls so; power of the distance from the transmitter", least=0, most=6,
-        randomized=(2, 4), option=True,
-    )  # fmt: skip
+        4.0,
+        "-",
+        "of a magnetic dipole, whose gradient falls so; power of the distance from the transmitter",
+        least=0,
+        most=6,
+        randomized=(2, 4),
+        option=True,
+    )
     position_distortion: float = quantity(
-        1e-3, "m", "assumed; of metal nearby, RMS per axis of a smooth field that an episode draws", least=0, most=0.1,
-        randomized=(0, 2e-3), option=True,
-    )  # fmt: skip
+        1e-3,
+        "m",
+        "assumed; of metal nearby, RMS per axis of a smooth field that an episode draws",
+        least=0,
+        most=0.1,
+        randomized=(0, 2e-3),
+        option=True,
+    )
     distortion_length: float = quantity(
         0.6, "m", "assumed; wavelength of that field", least=0.05, most=100, randomized=(0.4, 1.0), option=True
     )
@@ -87,9 +107,14 @@ class Electronics(Part):
     registration_y: float = quantity(0.0, "m", "assumed", least=-10, most=10, option=True)
 
     pressure_bias: float = quantity(
-        2000.0, "Pa", f"assumed, 0.2 % of a cell of 10 bar; per chamber, {NO_LARGER}", least=0, most=1e6, randomized=(0, 5000),
+        2000.0,
+        "Pa",
+        f"assumed, 0.2 % of a cell of 10 bar; per chamber, {NO_LARGER}",
+        least=0,
+        most=1e6,
+        randomized=(0, 5000),
         option=True,
-    )  # fmt: skip
+    )
     pressure_range: float = quantity(1e6, "Pa", "assumed; full scale, absolute", above=0, most=1e8, option=True)
 
     adc_bits: float = quantity(
@@ -99,23 +124,43 @@ class Electronics(Part):
         14.0, "-", "assumed; of the valves' voltages, boards have 12 to 16", least=0, most=32, randomized=(12, 16), option=True
     )
     missed_periods: float = quantity(
-        0.001, "-", "assumed; fraction of control periods in which the board neither reads nor writes", least=0, most=0.9,
-        randomized=(0, 0.01), option=True,
-    )  # fmt: skip
+        0.001,
+        "-",
+        "assumed; fraction of control periods in which the board neither reads nor writes",
+        least=0,
+        most=0.9,
+        randomized=(0, 0.01),
+        option=True,
+    )
 
     clock_jitter: float = quantity(
-        0.0, "-", "0 is a steady clock; the valves' voltages are late by up to this fraction of a period, up to 0.5 assumed of "
-        "boards without a real-time system", least=0, most=1, option=True, worth=(0, 0.5),
-    )  # fmt: skip
+        0.0,
+        "-",
+        "0 is a steady clock; the valves' voltages are late by up to this fraction of a period, up to 0.5 assumed of "
+        "boards without a real-time system",
+        least=0,
+        most=1,
+        option=True,
+        worth=(0, 0.5),
+    )
 
     acceleration_bandwidth: float = quantity(
-        0.0, "Hz", "0 is a head without an acceleration sensor; -3 dB of a first-order low-pass, 200 to 400 assumed of a "
-        "micromechanical one", least=0, most=1e5, option=True,
-    )  # fmt: skip
-    acceleration_noise: float = quantity(
-        0.02, "m/s2", "assumed; standard deviation per axis and period, 100 ug/sqrt(Hz) over 400 Hz", least=0, most=100,
+        0.0,
+        "Hz",
+        "0 is a head without an acceleration sensor; -3 dB of a first-order low-pass, 200 to 400 assumed of a "
+        "micromechanical one",
+        least=0,
+        most=1e5,
         option=True,
-    )  # fmt: skip
+    )
+    acceleration_noise: float = quantity(
+        0.02,
+        "m/s2",
+        "assumed; standard deviation per axis and period, 100 ug/sqrt(Hz) over 400 Hz",
+        least=0,
+        most=100,
+        option=True,
+    )
     acceleration_bias: float = quantity(
         0.1, "m/s2", f"assumed, of the sensor and of gravity that was taken off; {NO_LARGER}", least=0, most=100, option=True
     )

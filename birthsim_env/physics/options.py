@@ -49,9 +49,20 @@ def alter(p: Array, own: Array, n: int) -> None:
 
 @helper
 def lagged_chamber(
-    x: Array, p: Array, dx: Array, i: int, chamber: int, pressure: int, temperature: int, other: int, spool: int, area: int,
-    perimeter: int, length: float, length_rate: float,
-) -> float:  # fmt: skip
+    x: Array,
+    p: Array,
+    dx: Array,
+    i: int,
+    chamber: int,
+    pressure: int,
+    temperature: int,
+    other: int,
+    spool: int,
+    area: int,
+    perimeter: int,
+    length: float,
+    length_rate: float,
+) -> float:
     """Rates of a chamber behind a tube, where there is one; returns what its valve draws from the supply, kg/s."""
     supplied, exhausted = dynamics.flows_of(x, p, i, pressure, temperature, spool)
     row = at.STATES + FLOWS + chamber
@@ -61,7 +72,7 @@ def lagged_chamber(
         inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
         dynamics.exchange(
             x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, x[row, i], x[row + 4, i], inverse
-        )  # fmt: skip
+        )
     return supplied
 
 
@@ -95,9 +106,17 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
         ) + lagged_chamber(x, own, dx, i, 3, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
         source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
         filled = own[at.LINE, i] * valves.driving_flow(
-            source, 1.0 / source, own[at.COLDNESS, i], supply, inverse, own[at.COLDNESS, i], own[at.RHO0, i],
-            own[at.CRITICAL, i], own[at.KNEE, i], own[at.LAMINAR, i],
-        )  # fmt: skip
+            source,
+            1.0 / source,
+            own[at.COLDNESS, i],
+            supply,
+            inverse,
+            own[at.COLDNESS, i],
+            own[at.RHO0, i],
+            own[at.CRITICAL, i],
+            own[at.KNEE, i],
+            own[at.LAMINAR, i],
+        )
         dx[at.STATES + RESERVOIR, i] = own[at.LINE_GAIN, i] * (filled - drawn) if own[at.LINE, i] > 0.0 else 0.0
 
 
@@ -142,9 +161,17 @@ def advance(
         mine = slice(first, first + n)
         for sample in range(forces.shape[0]):
             integrate(
-                state[:, mine], further[:, mine], command[:, mine], forces[sample][:, mine], parameters[:, mine], steps, step,
-                impacts[:, mine], scratch, n,
-            )  # fmt: skip
+                state[:, mine],
+                further[:, mine],
+                command[:, mine],
+                forces[sample][:, mine],
+                parameters[:, mine],
+                steps,
+                step,
+                impacts[:, mine],
+                scratch,
+                n,
+            )
 
 
 @helper

@@ -16,7 +16,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import checked_count, is_within, shown
 
 if TYPE_CHECKING:
-    from birthsim_env.physics.gradients.plant import Derivatives
+    from birthsim_env.gradients.plant import Derivatives
 
 MOST_LANES = 2**20
 """Lanes side by side; a million take some gigabytes."""
@@ -105,8 +105,8 @@ class Plant:
         return self.state
 
     def vjp(self, opening_command: ArrayLike, user_force: ArrayLike, duration: float) -> "Callable[..., Derivatives]":
-        """``advance``, with its arguments and bits; returns its pullback, see ``physics.gradients.plant.vjp``."""
-        from birthsim_env.physics.gradients.plant import vjp  # late: it generates code
+        """``advance``, with its arguments and bits; returns its pullback, see ``gradients.plant.vjp``."""
+        from birthsim_env.gradients.plant import vjp  # late: it generates code
 
         return vjp(self, *self._inputs(opening_command, user_force, duration))
 

@@ -38,9 +38,17 @@ def flow_function(ratio: float, critical: float, knee: float, slope: float) -> f
 
 @helper
 def driving_flow(
-    p_from: float, inverse_from: float, coldness_from: float, p_to: float, inverse_to: float, coldness_to: float,
-    rho0: float, critical: float, knee: float, slope: float,
-) -> float:  # fmt: skip
+    p_from: float,
+    inverse_from: float,
+    coldness_from: float,
+    p_to: float,
+    inverse_to: float,
+    coldness_to: float,
+    rho0: float,
+    critical: float,
+    knee: float,
+    slope: float,
+) -> float:
     """Mass flow per unit of conductance from one side to the other, Pa kg/m3; negative where the far side has the higher
     pressure (roles exchanged).
 

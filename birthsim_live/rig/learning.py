@@ -62,9 +62,16 @@ def write_learning(folder: Path) -> None:
         if key_of(array) in regions:
             regions[key_of(array)].of(data, BEGINNINGS)[...] = array
     terms, ends, _, seen = many.closing[0].tables
-    first = {name: regions[key_of(array)].first for name, array in {
-        "action": simulation.action, "impacts": simulation.impacts, "terms": terms, "ends": ends, "seen": seen,
-    }.items()}  # fmt: skip
+    first = {
+        name: regions[key_of(array)].first
+        for name, array in {
+            "action": simulation.action,
+            "impacts": simulation.impacts,
+            "terms": terms,
+            "ends": ends,
+            "seen": seen,
+        }.items()
+    }
     data[regions[key_of(seen)].first :][: regions[key_of(seen)].rows] = 0.0
     differs = np.flatnonzero((data != data[:, :1]).any(axis=1))
     write_wasm(many.functions, folder / "learn.wasm", program.threads)

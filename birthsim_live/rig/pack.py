@@ -66,9 +66,7 @@ that is frozen would pull for ever); control periods between rows of a recording
 time."""
 
 
-def pack(
-    rig: Parameters, policies: Sequence[str], functions: list[str] | None = None, others: Sequence[str] = ()
-) -> Packed:  # fmt: skip
+def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None = None, others: Sequence[str] = ()) -> Packed:
     """All that a rig in the browser is made of, with ``policies`` (folders or shipped names) and, of ``others`` than the
     controllers that are listed, those that are compiled; for code that has ``functions``, without them for code that is to be
     built.

@@ -66,10 +66,16 @@ class TimedRequests(H11Protocol):
 def configured(app: ASGIApp, request_time: float) -> uvicorn.Config:
     """What a server needs to serve ``app``; a request has ``request_time`` s to arrive."""
     config = uvicorn.Config(
-        app, log_level="warning", http=partial(TimedRequests, request_time),  # type: ignore[arg-type]
-        ws=BoundedSockets, ws_max_size=LARGEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
-        proxy_headers=False, server_header=False,
-    )  # fmt: skip
+        app,
+        log_level="warning",
+        http=partial(TimedRequests, request_time),  # type: ignore[arg-type]
+        ws=BoundedSockets,
+        ws_max_size=LARGEST,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=1,
+        proxy_headers=False,
+        server_header=False,
+    )
     logging.getLogger("uvicorn.error").addFilter(_worth_a_line)
     return config
 

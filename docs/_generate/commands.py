@@ -9,9 +9,8 @@ from birthsim.export import FORMS
 def commands() -> str:
     """A section for every command that parses options itself, and for every form of ``birthsim export``."""
     places = {
-        f"birthsim {name}": COMMANDS[name]
-        for group in GROUPS.values() for name in group if name not in ("export", "study")
-    }  # fmt: skip
+        f"birthsim {name}": COMMANDS[name] for group in GROUPS.values() for name in group if name not in ("export", "study")
+    }
     sections = [_of(name, one.package, one.module, one.example) for name, one in places.items()]
     forms: dict[tuple[str, str], list[str]] = {}
     for form, (package, module, *_) in FORMS.items():

@@ -38,21 +38,41 @@ def _shared() -> str:
     ]
     info = [f"| `{name}` | {size} | {words} |" for name, (size, words) in FIELDS.items()]
     terms = (reward.__doc__ or "").strip()
-    return "\n".join([
-        "## What all have in common", "",
-        f"Version of the package: {birthsim_env.__version__}. The full contract of an environment is its docstring, "
-        f"{{py:class}}`birthsim_env.env.BirthSIMEnv`.", "",
-        "### Observation", "",
-        f"Each entry is a reading divided by the scale in the last column, clipped to ±{observation.LIMIT:g}; "
-        "the last action follows them.", "",
-        "| index | entry | value that maps to 1 |", "|---|---|---|", *rows, "",
-        "### Reward", "", terms, "",
-        "### Arguments and their defaults", "",
-        ", ".join(f"`{name}={value}`" for name, value in _arguments().items()) + ".", "",
-        "### Info", "", "The true state, whatever the sensors say.", "",
-        "| key | numbers | unit and meaning |", "|---|---|---|", *info, *(f"| `{name}` | 1 | term of the reward |" for name in
-        reward.REWARD_TERMS), "| `is_success` | 1 | settled error below 1 mm so far, and not terminated |",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "## What all have in common",
+            "",
+            f"Version of the package: {birthsim_env.__version__}. The full contract of an environment is its docstring, "
+            f"{{py:class}}`birthsim_env.env.BirthSIMEnv`.",
+            "",
+            "### Observation",
+            "",
+            f"Each entry is a reading divided by the scale in the last column, clipped to ±{observation.LIMIT:g}; "
+            "the last action follows them.",
+            "",
+            "| index | entry | value that maps to 1 |",
+            "|---|---|---|",
+            *rows,
+            "",
+            "### Reward",
+            "",
+            terms,
+            "",
+            "### Arguments and their defaults",
+            "",
+            ", ".join(f"`{name}={value}`" for name, value in _arguments().items()) + ".",
+            "",
+            "### Info",
+            "",
+            "The true state, whatever the sensors say.",
+            "",
+            "| key | numbers | unit and meaning |",
+            "|---|---|---|",
+            *info,
+            *(f"| `{name}` | 1 | term of the reward |" for name in reward.REWARD_TERMS),
+            "| `is_success` | 1 | settled error below 1 mm so far, and not terminated |",
+        ]
+    )
 
 
 def _section(scenario: str) -> str:
@@ -66,11 +86,23 @@ def _section(scenario: str) -> str:
     }
     rows = [f"| {fact} | {text} |" for fact, text in facts.items()]
     made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]
-    return "\n".join([
-        f"## `{name}`", "", _picture(scenario), "", "| what | value |", "|---|---|", *rows, "",
-        "What it is made of, as it stands and as `randomize` draws it (SI units):", "", "```py",
-        "\n\n".join(made).rstrip(), "```",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            f"## `{name}`",
+            "",
+            _picture(scenario),
+            "",
+            "| what | value |",
+            "|---|---|",
+            *rows,
+            "",
+            "What it is made of, as it stands and as `randomize` draws it (SI units):",
+            "",
+            "```py",
+            "\n\n".join(made).rstrip(),
+            "```",
+        ]
+    )
 
 
 def _experiment(name: str) -> str:

@@ -2,11 +2,11 @@
 
 from docutils import nodes
 
-from studies.figures import figure
+from lab.studies.figures import figure
 
 
 def figure_role(name, rawtext, text, lineno, inliner, options=None, content=()):
-    """The figure that ``studies.figures`` finds; an unknown name fails the build."""
+    """The figure that ``lab.studies.figures`` finds; an unknown name fails the build."""
     try:
         return [nodes.Text(figure(text))], []
     except ValueError as error:

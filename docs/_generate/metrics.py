@@ -28,15 +28,20 @@ MEANINGS = {
 def metrics() -> str:
     """The table, and what its words mean in figures."""
     rows = [f"| `{name}` | {unit} | {_meaning(name)} |" for name, unit in UNITS.items()]
-    return "\n".join([
-        "| metric | unit | meaning |", "|---|---|---|", *rows, "",
-        f"- Nothing changes: target, force and setpoints have been constant for {QUIET:g} s.",
-        f"- `stiffness_error`, `cross_motion` and `unrest` exist where the target stands still and the episode ends in "
-        f"a push held for {HELD:g} s. Positions are means over {WINDOW:g} s, so hunting does not enter.",
-        f"- Stuck: slower than {1e3 * STUCK:g} mm/s. Restarted: faster than {1e3 * RUNNING:g} mm/s after that.",
-        "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what "
-        "`birthsim study haptics` measures.",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "| metric | unit | meaning |",
+            "|---|---|---|",
+            *rows,
+            "",
+            f"- Nothing changes: target, force and setpoints have been constant for {QUIET:g} s.",
+            f"- `stiffness_error`, `cross_motion` and `unrest` exist where the target stands still and the episode ends in "
+            f"a push held for {HELD:g} s. Positions are means over {WINDOW:g} s, so hunting does not enter.",
+            f"- Stuck: slower than {1e3 * STUCK:g} mm/s. Restarted: faster than {1e3 * RUNNING:g} mm/s after that.",
+            "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what "
+            "`birthsim study haptics` measures.",
+        ]
+    )
 
 
 def _meaning(name: str) -> str:

@@ -29,10 +29,15 @@ MATRICES = (
 
 ANOTHER = Parameters().replace(
     {
-        "geometry.gamma3": 1.4, "mechanics.mass": 4.2, "cylinder1.viscous_friction": 55.0, "cylinder2.viscous_friction": 12.0,
-        "cylinder1.coulomb_friction": 20.0, "cylinder2.coulomb_friction": 8.0, "air.polytropic_index": 1.3,
+        "geometry.gamma3": 1.4,
+        "mechanics.mass": 4.2,
+        "cylinder1.viscous_friction": 55.0,
+        "cylinder2.viscous_friction": 12.0,
+        "cylinder1.coulomb_friction": 20.0,
+        "cylinder2.coulomb_friction": 8.0,
+        "air.polytropic_index": 1.3,
     }
-)  # fmt: skip
+)
 
 
 def times(matrices: Array, vectors: Array) -> Array:

@@ -11,8 +11,8 @@ from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
-from studies.verification.strict_feedback import strict_feedback_rates
+from lab.studies.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
+from lab.studies.verification.strict_feedback import strict_feedback_rates
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles.closed_loop import FRICTIONLESS
@@ -145,11 +145,16 @@ def test_it_keeps_an_observer_of_its_own() -> None:
     rows = closed_loop.holding(np.array([[0.5], [0.0]]), 2000.0).rows
     measured_at = [
         Measurement(
-            np.array([0.001 * k]), np.array([[0.5], [1e-4 * k]]), np.array([0.004 * (k // 4)]), np.zeros((2, 1)),
-            np.full((4, 1), 4e5), np.zeros((2, 1)), sampled=True,
+            np.array([0.001 * k]),
+            np.array([[0.5], [1e-4 * k]]),
+            np.array([0.004 * (k // 4)]),
+            np.zeros((2, 1)),
+            np.full((4, 1), 4e5),
+            np.zeros((2, 1)),
+            sampled=True,
         )
         for k in range(20)
-    ]  # fmt: skip
+    ]
     alone, beside = BacksteppingController(), BacksteppingController()
     function = LyapunovFunction(beside)
     for signal in measured_at:

@@ -12,10 +12,13 @@ from tests.oracles.closed_loop import FRICTIONLESS
 
 ANOTHER = FRICTIONLESS.replace(
     {
-        "mechanics.mass": 2.0, "cylinder1.viscous_friction": 10.0, "cylinder2.viscous_friction": 60.0,
-        "chambers.dead_volume": 25e-6, "valves.time_constant": 0.002,
+        "mechanics.mass": 2.0,
+        "cylinder1.viscous_friction": 10.0,
+        "cylinder2.viscous_friction": 60.0,
+        "chambers.dead_volume": 25e-6,
+        "valves.time_constant": 0.002,
     }
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(

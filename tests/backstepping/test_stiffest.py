@@ -7,9 +7,9 @@ import pytest
 from baselines.backstepping.stiffest import stiffest, stiffest_direction
 from baselines.registry import make_controller
 from birthsim_env import Parameters
-from studies.haptics.worlds import POSES, no_hand, resting
-from studies.stability.rig_port import RigPort
-from studies.stability.swinging import ASKED, rests_up_to
+from lab.studies.haptics.worlds import POSES, no_hand, resting
+from lab.studies.stability.rig_port import RigPort
+from lab.studies.stability.swinging import ASKED, rests_up_to
 
 LAWS = ("backstepping", "backstepping-cartesian")
 LIGHT = Parameters().replace({"mechanics.mass": 1.6, "valves.time_constant": 0.008})
@@ -27,11 +27,12 @@ def test_the_bound_is_the_mass_over_the_lag():
         ("backstepping", "lab", LIGHT),
         *(
             pytest.param(name, *case, marks=pytest.mark.slow)
-            for name in LAWS for case in (("ideal", Parameters()), ("lab", Parameters()), ("lab", LIGHT))
+            for name in LAWS
+            for case in (("ideal", Parameters()), ("lab", Parameters()), ("lab", LIGHT))
             if (name, *case) != ("backstepping", "lab", LIGHT)
         ),
     ],
-)  # fmt: skip
+)
 def test_the_laws_rest_below_the_bound_and_swing_not_far_above(name, sensors, rig):
     """ "Not far": the measured range of the rate, 12 to 34 1/s, and one step of the setpoints tried."""
     limit = rests_up_to(name, rig, sensors)

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from birthsim_env import Parameters
-from studies.verification.strict_feedback import neglected_acceleration, strict_feedback_rates
+from lab.studies.verification.strict_feedback import neglected_acceleration, strict_feedback_rates
 from tests.oracles import derived_law as derived
 from tests.physics.rigs import TILTED
 

@@ -3,7 +3,7 @@
 import pytest
 from matplotlib import pyplot as plt
 
-from studies.comparison import figure, stiffness_figures
+from lab.studies.comparison import figure, stiffness_figures
 
 
 @pytest.fixture

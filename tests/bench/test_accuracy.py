@@ -8,10 +8,10 @@ import pytest
 
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy import errors as accuracy
-from studies.accuracy import tables as accuracy_tables
-from studies.accuracy.figure import accuracy_figure
-from studies.accuracy.motions import MOTIONS, strong
+from lab.studies.accuracy import errors as accuracy
+from lab.studies.accuracy import tables as accuracy_tables
+from lab.studies.accuracy.figure import accuracy_figure
+from lab.studies.accuracy.motions import MOTIONS, strong
 
 
 @pytest.mark.parametrize(("method", "order"), accuracy.EVALUATIONS.items())

@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 from agents.residual.settings import LAWS
-from studies.speed import speeds as speed
-from studies.speed import study as bench
+from lab.studies.speed import speeds as speed
+from lab.studies.speed import study as bench
 from tests.console import call
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from baselines.bench.pieces import controller_settings, file_stem
 from birthsim_env import Parameters
-from studies.comparison import figure as comparison_figures
-from studies.comparison.grid import METRICS, REFERENCE, Conditions, costs, gather, statistics
-from studies.comparison.tables import losses, overview
+from lab.studies.comparison import figure as comparison_figures
+from lab.studies.comparison.grid import METRICS, REFERENCE, Conditions, costs, gather, statistics
+from lab.studies.comparison.tables import losses, overview
 from tests.controllers.test_named_controllers import OWN
 
 RIG = Parameters()
@@ -44,13 +44,17 @@ def result(lost=(False, False, False), cost=1.0, **metrics):
 @pytest.fixture
 def cells():
     """Three controllers in two environments; the second loses an episode of the first, the third all of them."""
-    return gather({
-        (REFERENCE, CIRCLE): result(settled_rms=[2.0, 4.0, 8.0], air=[10.0, 20.0, 30.0], restarts=[0.0, 0.0, 0.0]),
-        ("other", CIRCLE): result((False, True, False), 2.0, settled_rms=[1.0, 0.1, 2.0], air=[5.0, 5.0, 5.0]),
-        ("worst", CIRCLE): result((True, True, True), 4.0, settled_rms=[1.0, 1.0, None]),
-        (REFERENCE, PROBE): result(stiffness_error=[-20.0, 10.0, None], hunting_x=[1.0, 2.0, None], hunting_y=[3.0, 1.0, None]),
-        ("other", PROBE): result(stiffness_error=[1.0, -1.0, 1.0], hunting_x=[0.1, 0.1, 0.1], hunting_y=[0.0, 0.2, 0.0]),
-    })  # fmt: skip
+    return gather(
+        {
+            (REFERENCE, CIRCLE): result(settled_rms=[2.0, 4.0, 8.0], air=[10.0, 20.0, 30.0], restarts=[0.0, 0.0, 0.0]),
+            ("other", CIRCLE): result((False, True, False), 2.0, settled_rms=[1.0, 0.1, 2.0], air=[5.0, 5.0, 5.0]),
+            ("worst", CIRCLE): result((True, True, True), 4.0, settled_rms=[1.0, 1.0, None]),
+            (REFERENCE, PROBE): result(
+                stiffness_error=[-20.0, 10.0, None], hunting_x=[1.0, 2.0, None], hunting_y=[3.0, 1.0, None]
+            ),
+            ("other", PROBE): result(stiffness_error=[1.0, -1.0, 1.0], hunting_x=[0.1, 0.1, 0.1], hunting_y=[0.0, 0.2, 0.0]),
+        }
+    )
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from baselines.bench.evaluation import Evaluation
 from baselines.figures import style
 from baselines.figures.runs import episode_figure, error_over_time, figure4
 from baselines.figures.style import headline, legend_below, save
-from studies.results import read_result
-from studies.shelf import declared, names
-from studies.study import no_pictures
+from lab.studies.results import read_result
+from lab.studies.shelf import declared, names
+from lab.studies.study import no_pictures
 from tests.figures import caught, contrast
 
 
@@ -88,10 +88,14 @@ def test_what_the_style_forbids_is_found(tmp_path, monkeypatch):
     figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
     save(figure, tmp_path, "poor")
     assert sorted(drawn[0][1]) == [
-        "5 pt: small", "a legend lies on axes", "cut off: a text that leaves the figure on its right side",
-        "neither a column nor a page wide", "no finding as title", "one and other differ in colour alone",
+        "5 pt: small",
+        "a legend lies on axes",
+        "cut off: a text that leaves the figure on its right side",
+        "neither a column nor a page wide",
+        "no finding as title",
+        "one and other differ in colour alone",
         "yellow: contrast 1.1",
-    ]  # fmt: skip
+    ]
     assert contrast("black") == pytest.approx(21)
     assert contrast("#767676") == pytest.approx(4.54, abs=0.01)
 

@@ -4,7 +4,7 @@ import csv
 
 from baselines.bench.measures import DISCOUNTS
 from birthsim_env.scores import ROLES
-from studies.scores.tables import Scored, data, overview
+from lab.studies.scores.tables import Scored, data, overview
 
 
 def row(paid, error):
@@ -24,6 +24,9 @@ def test_the_overview_names_the_best_and_says_where_there_is_none():
 def test_the_data_file_has_every_controller_with_its_returns():
     table = list(csv.DictReader(data(FOUND).splitlines()))
     assert [(one["controller"], one["score"], one["error, mm"]) for one in table] == [
-        ("random", "-25", "lost"), ("shut", "0", "40"), ("law", "50", "2"), ("best", "100", "0.5"),
-    ]  # fmt: skip
+        ("random", "-25", "lost"),
+        ("shut", "0", "40"),
+        ("law", "50", "2"),
+        ("best", "100", "0.5"),
+    ]
     assert (table[1]["success, %"], table[1]["lost, %"], table[1]["return at 0.9"]) == ("25", "50", "9")

@@ -8,9 +8,9 @@ import pytest
 from baselines.bench.pieces import controller_settings
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.stability import maps as stability
-from studies.stability.figure import stability_figure
-from studies.stability.maps import MAPS, Axis, Cases, Map, Window, describe_map, judge, stability_tasks, stable_up_to
+from lab.studies.stability import maps as stability
+from lab.studies.stability.figure import stability_figure
+from lab.studies.stability.maps import MAPS, Axis, Cases, Map, Window, describe_map, judge, stability_tasks, stable_up_to
 from tests.console import OWN, call, strict
 
 RIG = Parameters()

@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from baselines.bench.statistics import LEVEL, LOST_ERROR, jsonable, number, penalize_lost, quantile, summarize
-from studies.comparison import paired
-from studies.comparison.paired import median_interval, paired_ratios, summary_with_interval
+from lab.studies.comparison import paired
+from lab.studies.comparison.paired import median_interval, paired_ratios, summary_with_interval
 
 INF, NAN = math.inf, math.nan
 

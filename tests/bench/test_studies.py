@@ -11,9 +11,9 @@ from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, joint_force
-from studies.comparison import stiffness as studies
-from studies.comparison import stiffness_figures as study_figures
-from studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study
+from lab.studies.comparison import stiffness as studies
+from lab.studies.comparison import stiffness_figures as study_figures
+from lab.studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study
 
 RIG = Parameters()
 SMOOTH = frictionless(RIG)

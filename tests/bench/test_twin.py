@@ -6,7 +6,7 @@ import pytest
 from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled.lanes import HALF_L1, HALF_L2, V1, V2, Y1, Y2
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
-from studies.speed.twin import PLAIN, Twin, has_compiler
+from lab.studies.speed.twin import PLAIN, Twin, has_compiler
 
 pytestmark = pytest.mark.skipif(not has_compiler(), reason="no gcc")
 

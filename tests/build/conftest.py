@@ -4,8 +4,8 @@ import pytest
 from filelock import FileLock
 
 from birthsim_build.code.targets import HOST
-from studies.targets.reference import PERIODS
-from studies.targets.running import node_rows
+from lab.studies.targets.reference import PERIODS
+from lab.studies.targets.running import node_rows
 from tests.build.targets import BUILT, build, device, need_linker, need_program
 
 __all__ = ["device"]

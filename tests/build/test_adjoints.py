@@ -16,7 +16,7 @@ from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.machine import machine_named
 from birthsim_build.device.program import Pieces, program_of
-from birthsim_env.gradients import Recorder
+from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.physics.compiled.lanes import PARAMETERS
 from tests.build.targets import assert_fusing_changes_nothing, assert_same_bits, fill, need_linker, need_program, need_threads
 from tests.build.test_threads import assert_exact

@@ -23,10 +23,15 @@ from tests.build.test_threads import assert_exact
 
 SEED = 2_200_000
 
-OPTIONS = Parameters().replace({
-    "air.supply_conductance": 1e-8, "mechanics.mode_frequency": 20.0, "chambers.tube_length": 1.0, "valves.hysteresis": 0.02,
-    "electronics.acceleration_bandwidth": 50.0,
-})  # fmt: skip
+OPTIONS = Parameters().replace(
+    {
+        "air.supply_conductance": 1e-8,
+        "mechanics.mode_frequency": 20.0,
+        "chambers.tube_length": 1.0,
+        "valves.hysteresis": 0.02,
+        "electronics.acceleration_bandwidth": 50.0,
+    }
+)
 
 CASES = {
     **{f"{name} {sensors}": (name, {"sensors": sensors}) for name in SCENARIOS for sensors in SENSORS},

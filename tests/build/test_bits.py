@@ -13,9 +13,9 @@ from birthsim_build.code.targets import HOST
 from birthsim_build.loops import plant_world
 from birthsim_env import Parameters, Plant, Reference
 from birthsim_env.loop.rows import POSITION, REFERENCE, measurement_of
-from studies.targets import reference
-from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
-from studies.targets.running import EMULATED, ROW, emulated_rows, library_rows
+from lab.studies.targets import reference
+from lab.studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
+from lab.studies.targets.running import EMULATED, ROW, emulated_rows, library_rows
 from tests.build.targets import BUILT, assert_same_bits, build, need_linker, need_program
 
 LAW = "admittance-backstepping"

@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 
-from studies.targets.running import ROW, library_rows
+from lab.studies.targets.running import ROW, library_rows
 from tests.build.targets import need
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")

@@ -9,8 +9,8 @@ import pytest
 from birthsim_build.image import HEAD, LEFT_OUT
 from birthsim_build.layout import ROWS
 from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
-from studies.targets.reference import PERIODS, SHARED, loop_rows
-from studies.targets.running import ROW, library_loop
+from lab.studies.targets.reference import PERIODS, SHARED, loop_rows
+from lab.studies.targets.running import ROW, library_loop
 from tests.build.targets import assert_same_bits
 
 LOOP = {"scenario": "circle", "sensors": "ideal", "controller": "admittance-backstepping"}

@@ -1,4 +1,4 @@
-"""Recorded episodes are those of the environment; ``studies/clients/test_offline.py`` has Minari read the files."""
+"""Recorded episodes are those of the environment; ``lab/studies/clients/test_offline.py`` has Minari read the files."""
 
 import gymnasium
 import numpy as np

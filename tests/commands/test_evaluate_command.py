@@ -9,8 +9,8 @@ import pytest
 from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.files import finite
-from studies.comparison import stiffness as studies
-from studies.comparison.study import figures_of
+from lab.studies.comparison import stiffness as studies
+from lab.studies.comparison.study import figures_of
 from tests.console import OWN, assert_picture, call, interrupted, strict
 
 

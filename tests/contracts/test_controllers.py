@@ -23,10 +23,7 @@ POLICIES = [f"residual[policy={name}]" for name in shipped_names()]
 CHOICES = [*LISTED, *(name for name in controller_names() if name not in CONTROLLERS)]
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 NAMES = [*CHOICES, IDENTIFIED, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
-CASES = [
-    pytest.param(name, sensors, RIG, id=f"{name}-{sensors}")
-    for name in NAMES for sensors in SENSORS
-]  # fmt: skip
+CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name in NAMES for sensors in SENSORS]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 CONTROLLED = [name for name in NAMES if not name.endswith("-valves")]
 

@@ -13,16 +13,16 @@ from baselines.controller import checked_command
 from baselines.identification.experiment import propose
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
 from birthsim_env.drawing.rendering import Renderer
-from birthsim_env.gradients import Recorder
+from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.signals import InPlane
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
-from studies.labour.model import Labour
-from studies.lyapunov import LyapunovFunction
-from studies.verification.strict_feedback import strict_feedback_rates
+from lab.studies.labour.model import Labour
+from lab.studies.lyapunov import LyapunovFunction
+from lab.studies.verification.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = float("nan"), float("inf")

@@ -12,8 +12,8 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.own_parts import stiffness_of
 from birthsim_live.logs.reading import read_log
-from studies.sweeps.plan import load_sweep
-from studies.sweeps.work import tasks_of
+from lab.studies.sweeps.plan import load_sweep
+from lab.studies.sweeps.work import tasks_of
 
 CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()

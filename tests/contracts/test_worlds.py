@@ -19,11 +19,15 @@ ARGUMENTS = {
     "randomize": (False, True, "plant", "scenario"), "user_force": (None, *HANDS), "policy_period": (0.001, 0.01, 0.04),
     "duration": (None, 0.1, 3.0), "autoreset_mode": ("NextStep", "SameStep"),
 }  # fmt: skip
-WORLDS = st.fixed_dictionaries({
-    "scenario": st.sampled_from(sorted(SCENARIOS)), "num_envs": st.integers(1, 5), "seed": st.integers(0, 2**63),
-    "steps": st.integers(1, 60),
-    "arguments": st.fixed_dictionaries({name: st.sampled_from(values) for name, values in ARGUMENTS.items()}),
-})  # fmt: skip
+WORLDS = st.fixed_dictionaries(
+    {
+        "scenario": st.sampled_from(sorted(SCENARIOS)),
+        "num_envs": st.integers(1, 5),
+        "seed": st.integers(0, 2**63),
+        "steps": st.integers(1, 60),
+        "arguments": st.fixed_dictionaries({name: st.sampled_from(values) for name, values in ARGUMENTS.items()}),
+    }
+)
 
 
 def corner(seed):
@@ -64,11 +68,14 @@ def test_any_world_keeps_its_spaces_and_repeats_itself(world):
 
 PLAIN = [
     {
-        "scenario": name, "num_envs": 3, "seed": 11, "steps": 30,
+        "scenario": name,
+        "num_envs": 3,
+        "seed": 11,
+        "steps": 30,
         "arguments": {"sensors": "lab", "randomize": True, "duration": 0.2, "user_force": "guided"},
     }
     for name in SCENARIOS
-]  # fmt: skip
+]
 
 
 def test_environments_in_threads_of_a_program_are_alone():

@@ -11,8 +11,8 @@ from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.comparison.grid import as_described
-from studies.honest.sensor_floor import circle_floor, motion_floor, probe_floor
+from lab.studies.comparison.grid import as_described
+from lab.studies.honest.sensor_floor import circle_floor, motion_floor, probe_floor
 from tests.oracles import closed_loop
 
 RIG = Parameters()

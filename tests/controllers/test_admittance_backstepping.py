@@ -34,9 +34,20 @@ REST = {
 
 
 def commanded(
-    rig, now, motion, user=0.0, unseen=0.0, memory=None, told=0.0, spools=0.0, rest=0.0, moving=1.0, pneumatic=None,
-    lead_time=None, **gains
-):  # fmt: skip
+    rig,
+    now,
+    motion,
+    user=0.0,
+    unseen=0.0,
+    memory=None,
+    told=0.0,
+    spools=0.0,
+    rest=0.0,
+    moving=1.0,
+    pneumatic=None,
+    lead_time=None,
+    **gains,
+):
     """Openings (4, N) of the kernel; without ``lead_time`` and with shut spools they are those that the law wants."""
     lanes = motion.shape[1]
     seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))

@@ -78,10 +78,17 @@ class Aware(StagedController):
         assert not self.run_stages(measurement, reference)
         given, memory = self.known.given, self.memory
         return SimpleNamespace(
-            motion=self.known.motion.rows, moving=given.moving, force=given.force, believed=given.believed,
-            unseen=self.known.unseen, joints=memory.joints.rows, spools=memory.chambers.spool,
-            pressures=memory.chambers.pressure, disturbance=memory.pistons.disturbance, rest=memory.pistons.rest,
-        )  # fmt: skip
+            motion=self.known.motion.rows,
+            moving=given.moving,
+            force=given.force,
+            believed=given.believed,
+            unseen=self.known.unseen,
+            joints=memory.joints.rows,
+            spools=memory.chambers.spool,
+            pressures=memory.chambers.pressure,
+            disturbance=memory.pistons.disturbance,
+            rest=memory.pistons.rest,
+        )
 
     def commanded(self, openings: Array) -> None:
         self.memory.chambers.opening[:] = openings

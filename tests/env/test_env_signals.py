@@ -52,18 +52,20 @@ def test_an_ideal_observation_is_info_over_the_documented_scales(name):
     for k, (seen, info) in enumerate(zip(observations, infos, strict=True)):
         external = 1.013e5 * math.pi / 4 * 0.010**2
         target = env.simulation.trajectory.sample(np.array([info["time"]]))[:, 0]
-        expected = np.concatenate([
-            info["tracking_error"] / 0.01,
-            info["velocity"] / 0.2,
-            info["piston_position"] / (0.1, 0.2),
-            (info["pneumatic_force"] - external + along_cylinders(info)) / 200,
-            info["pneumatic_stiffness"] / (5000, 2500),
-            info["pneumatic_stiffness_setpoint"] / (5000, 2500),
-            info["stiffness_setpoint"] / 5000,
-            info["user_force"] / 50,
-            target[2:4] / 0.2,
-            target[4:6] / 0.5,
-        ])  # fmt: skip
+        expected = np.concatenate(
+            [
+                info["tracking_error"] / 0.01,
+                info["velocity"] / 0.2,
+                info["piston_position"] / (0.1, 0.2),
+                (info["pneumatic_force"] - external + along_cylinders(info)) / 200,
+                info["pneumatic_stiffness"] / (5000, 2500),
+                info["pneumatic_stiffness_setpoint"] / (5000, 2500),
+                info["stiffness_setpoint"] / 5000,
+                info["user_force"] / 50,
+                target[2:4] / 0.2,
+                target[4:6] / 0.5,
+            ]
+        )
         np.testing.assert_allclose(seen[:20], np.clip(expected, -10, 10), rtol=1e-5, atol=1e-5)
         np.testing.assert_array_equal(seen[20:], actions[k - 1] if k else np.zeros(4))
 

@@ -44,7 +44,7 @@ WRAPPED = {
 
 @pytest.mark.parametrize("wrapped", WRAPPED.values(), ids=WRAPPED)
 def test_wrappers_that_use_more_than_arrays_in_boxes(wrapped):
-    """Pictures, and the information of lanes that have ended; ``studies/clients`` has the others."""
+    """Pictures, and the information of lanes that have ended; ``lab/studies/clients`` has the others."""
     env = wrapped()
     env.reset(seed=0)
     for _ in range(20):

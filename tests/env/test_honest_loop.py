@@ -11,8 +11,8 @@ from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import SENSORS
-from studies.haptics.worlds import no_hand, resting
-from studies.stability.rig_port import RigPort
+from lab.studies.haptics.worlds import no_hand, resting
+from lab.studies.stability.rig_port import RigPort
 from tests.env.test_loop import OwnValves, assert_same, course, own
 from tests.parts.test_honest_sensors import OFF
 

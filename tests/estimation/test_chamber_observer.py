@@ -19,11 +19,18 @@ BLIND = 1e-9
 
 ANOTHER = Parameters().replace(
     {
-        "cylinder1.stroke": 0.24, "cylinder1.rod_diameter": 0.014, "cylinder2.piston_diameter": 0.032,
-        "chambers.dead_volume": 2.2e-5, "valves.time_constant": 0.007, "valves.leakage_ratio": 0.02,
-        "valves.critical_ratio": 0.4, "air.temperature": 310.0, "air.polytropic_index": 1.35, "air.supply_pressure": 6.2e5,
+        "cylinder1.stroke": 0.24,
+        "cylinder1.rod_diameter": 0.014,
+        "cylinder2.piston_diameter": 0.032,
+        "chambers.dead_volume": 2.2e-5,
+        "valves.time_constant": 0.007,
+        "valves.leakage_ratio": 0.02,
+        "valves.critical_ratio": 0.4,
+        "air.temperature": 310.0,
+        "air.polytropic_index": 1.35,
+        "air.supply_pressure": 6.2e5,
     }
-)  # fmt: skip
+)
 TIGHT = Parameters().replace({"valves.leakage_ratio": 0.0, "valves.time_constant": 0.006})
 """Valves that do not leak."""
 

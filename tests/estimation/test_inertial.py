@@ -53,9 +53,12 @@ def test_an_error_dies_away_by_a_triple_pole(wrong):
 def test_late_rare_and_lost_samples_leave_no_error(latency):
     bias, jerk = 0.15, 0.8
     truth, found = run(
-        2500, lambda t: (0.1 * t + jerk * t**3 / 6, 0.1 + jerk * t**2 / 2),
-        lambda t, n: np.full((2, n), jerk * (t - PERIOD / 2) + bias), latency=latency, lost=0.2,
-    )  # fmt: skip
+        2500,
+        lambda t: (0.1 * t + jerk * t**3 / 6, 0.1 + jerk * t**2 / 2),
+        lambda t, n: np.full((2, n), jerk * (t - PERIOD / 2) + bias),
+        latency=latency,
+        lost=0.2,
+    )
     # What a third of a period's change of acceleration leaves of a parabola: jerk PERIOD^3/24 a period.
     np.testing.assert_allclose(found[-500:, :2], truth[-500:, :2], atol=2e-6)
     np.testing.assert_allclose(found[-500:, 2:], truth[-500:, 2:], atol=2e-5)

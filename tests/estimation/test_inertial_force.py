@@ -41,9 +41,17 @@ class Observed:
     def see(self, y, speed, acceleration, pressures):
         self.joints.position[:, 0], self.joints.speed[:, 0], self.moving.acceleration[:, 0] = y, speed, acceleration
         inertial_force.observe(
-            self.hand, self.felt, self.hold, self.seen, self.moving, self.joints, pressures[:, None], np.full(1, 1e-4),
-            self.belief, self.fresh,
-        )  # fmt: skip
+            self.hand,
+            self.felt,
+            self.hold,
+            self.seen,
+            self.moving,
+            self.joints,
+            pressures[:, None],
+            np.full(1, 1e-4),
+            self.belief,
+            self.fresh,
+        )
         self.fresh[:] = 0.0
         self.seen.time[:] += PERIOD
 

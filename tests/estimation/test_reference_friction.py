@@ -40,7 +40,7 @@ def circle(times: Array, size: float = 0.06) -> Array:
     angle = RATE * times
     return np.array(
         [0.5 + size * np.cos(angle), size / 2 * np.sin(angle), -size * RATE * np.sin(angle), size / 2 * RATE * np.cos(angle)]
-    )  # fmt: skip
+    )
 
 
 def piston_speeds(motion: Array) -> Array:

@@ -10,11 +10,11 @@ import pytest
 import agents  # noqa: F401  registers the residual environments
 from baselines.registry import make_controller
 from baselines.staged import driving
-from birthsim_env.gradients import Recorder
+from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.gradients.checks import CONTROLLERS
-from studies.gradients.loops import SMOOTH, begun, compared
+from lab.studies.gradients.checks import CONTROLLERS
+from lab.studies.gradients.loops import SMOOTH, begun, compared
 
 SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
     "valves": {"world": "BirthSIM/Circle-v1"},

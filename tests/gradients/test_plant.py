@@ -7,12 +7,12 @@ import numba
 import numpy as np
 import pytest
 
+from birthsim_env.gradients.plant import Derivatives, jvp, vjp
+from birthsim_env.gradients.right_hand_side import INPUTS, RIG, made
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.gradients.plant import Derivatives, jvp, vjp
-from birthsim_env.physics.gradients.right_hand_side import INPUTS, RIG, made
-from studies.gradients.states import SCALES, plant_of
+from lab.studies.gradients.states import SCALES, plant_of
 
 DURATION = 0.01
 

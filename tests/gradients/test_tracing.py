@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from birthsim_env.gradients import source
+from birthsim_env.gradients.derivatives import reverse
+from birthsim_env.gradients.graph import Graph
+from birthsim_env.gradients.symbols import empty, inputs
+from birthsim_env.gradients.tracing import UntraceableError, call
 from birthsim_env.parts.sensors import tracker
 from birthsim_env.parts.sensors.noise import normal
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.gradients import source
-from birthsim_env.physics.gradients.derivatives import reverse
-from birthsim_env.physics.gradients.graph import Graph
-from birthsim_env.physics.gradients.symbols import empty, inputs
-from birthsim_env.physics.gradients.tracing import UntraceableError, call
 
 LANES = 24
 

@@ -9,11 +9,11 @@ from birthsim_env.physics.compiled.lanes import PN2, PP2, Rig, parameter_array, 
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.bandwidth.study import BANDS, felt_impedance, hand_lines, lines
-from studies.bandwidth.valves import commanded_openings
-from studies.haptics.recording import record
-from studies.haptics.worlds import POSES, Condition, resting
-from studies.stability.rig_port import RigPort
+from lab.studies.bandwidth.study import BANDS, felt_impedance, hand_lines, lines
+from lab.studies.bandwidth.valves import commanded_openings
+from lab.studies.haptics.recording import record
+from lab.studies.haptics.worlds import POSES, Condition, resting
+from lab.studies.stability.rig_port import RigPort
 
 
 def test_there_are_twenty_lines_a_decade():

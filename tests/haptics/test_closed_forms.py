@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from baselines.impedance import DeclaredMotion, mass_spring_damper
-from studies.haptics import backdriving, release
-from studies.haptics.backdriving import beyond_spring, guiding_hand
-from studies.haptics.impedance import (
+from lab.studies.haptics import backdriving, release
+from lab.studies.haptics.backdriving import beyond_spring, guiding_hand
+from lab.studies.haptics.impedance import (
     bandwidth,
     last_before,
     noticeable_differences,
@@ -17,12 +17,20 @@ from studies.haptics.impedance import (
     port_damping,
     unnoticed_up_to,
 )
-from studies.haptics.multisine import FREQUENCIES, FUNDAMENTAL, SECONDS, SETTLING, impedance_felt, measured_part, multisine_hand
-from studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
-from studies.haptics.recording import record
-from studies.haptics.release import PULL, flight, pulling_hand
-from studies.haptics.worlds import resting
-from studies.stability.maps import push_and_release
+from lab.studies.haptics.multisine import (
+    FREQUENCIES,
+    FUNDAMENTAL,
+    SECONDS,
+    SETTLING,
+    impedance_felt,
+    measured_part,
+    multisine_hand,
+)
+from lab.studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
+from lab.studies.haptics.recording import record
+from lab.studies.haptics.release import PULL, flight, pulling_hand
+from lab.studies.haptics.worlds import resting
+from lab.studies.stability.maps import push_and_release
 from tests.oracles.ideal_ports import IdealPort, impedance, stiffest
 
 MASS, STIFFNESS = 3.0, 2000.0

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.haptics import backdriving, coupled, rendering
-from studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
-from studies.haptics.kept import kept, phase
-from studies.haptics.tables import backdriving_table, release_table
-from studies.stability import maps as stability
+from lab.studies.haptics import backdriving, coupled, rendering
+from lab.studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
+from lab.studies.haptics.kept import kept, phase
+from lab.studies.haptics.tables import backdriving_table, release_table
+from lab.studies.stability import maps as stability
 from tests.console import OWN, call, strict
 
 SETTINGS = {
@@ -99,17 +99,23 @@ def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost():
     first, found = kept({"controller": "mine", "impedance": [softer, piece]})["impedance"]
     assert "curves" not in first
     assert found["curves"] == {
-        "frequency": lines, "magnitude": [[1.5] * 2, [2.0] * 2, [2.5] * 2], "phase": [[0.0] * 2] * 3,
-        "declared": {"magnitude": [2.0] * 2, "phase": [0.0] * 2}, "damping": [[2.0, 4.0], [1.0, 2.0]], "energy": [1.5],
+        "frequency": lines,
+        "magnitude": [[1.5] * 2, [2.0] * 2, [2.5] * 2],
+        "phase": [[0.0] * 2] * 3,
+        "declared": {"magnitude": [2.0] * 2, "phase": [0.0] * 2},
+        "damping": [[2.0, 4.0], [1.0, 2.0]],
+        "energy": [1.5],
         "energy_period": 0.1,
-    }  # fmt: skip
+    }
     assert (found["shortage"], found["noticed"]) == ([1.0, 1.0, None, 3.0], [1.0, 0.333333, None, 0.02])
     assert found["bandwidth"] == [0.333333, 2.0, 0.0, 4.0]
     pull = {"lost": [False] * 3, "time": [0.0], "offset_mm": [[1.0], [2.0], [6.0]], "ideal": None, "given_back": [0.0] * 3}
     (let_go,) = kept({"release": [pull]})["release"]
     assert let_go == {
-        "lost": [False] * 3, "ideal": None, "curves": {"time": [0.0], "offset_mm": [[2.0], [1.0], [6.0]], "declared": None}
-    }  # fmt: skip
+        "lost": [False] * 3,
+        "ideal": None,
+        "curves": {"time": [0.0], "offset_mm": [[2.0], [1.0], [6.0]], "declared": None},
+    }
     nobody = kept({"impedance": [{**piece, "lost": [True] * 4}]})["impedance"][0]["curves"]
     assert nobody["magnitude"] == [[None] * 2] * 3
 

@@ -8,10 +8,10 @@ from baselines.backstepping.impedance import joint_impedance
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
 from baselines.registry import LISTED, UNCONTROLLED, make_controller
 from birthsim_env import Parameters, Reference
-from studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
-from studies.haptics.recording import record
-from studies.haptics.worlds import Condition, resting, uses_force
-from studies.stability.rig_port import RigPort
+from lab.studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
+from lab.studies.haptics.recording import record
+from lab.studies.haptics.worlds import Condition, resting, uses_force
+from lab.studies.stability.rig_port import RigPort
 
 RIG = Parameters()
 SLIDING = RIG.replace({f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)})

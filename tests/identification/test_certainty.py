@@ -23,9 +23,11 @@ def estimates(errors: Array, slopes: Array) -> tuple[Array, list[Fit]]:
     for theta, error in zip(found, errors, strict=True):
         residual = error - slopes @ theta
         problem = SimpleNamespace(
-            derivatives=-slopes, settled=lambda _, residual=residual: (None, residual), spread=np.ones(COUNT),
+            derivatives=-slopes,
+            settled=lambda _, residual=residual: (None, residual),
+            spread=np.ones(COUNT),
             quantities=QUANTITIES[:COUNT],
-        )  # fmt: skip
+        )
         fits.append(Fit(QUANTITIES[:COUNT], theta, Parameters(), problem, -tall, Noise(1.0, 1.0), 0.0))  # type: ignore[arg-type]
     return found, fits
 

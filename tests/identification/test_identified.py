@@ -52,11 +52,14 @@ def test_what_was_left_out_stands_in_the_file_of_the_rig(tmp_path):
     assert (tmp_path / "rig.toml").read_text().splitlines()[1] == "# left out: a row"
 
 
-@pytest.mark.parametrize(("name", "inside", "outside"), [
-    ("mechanics.mass", (2.0, 5.0), (1.4, 7.0)),
-    ("electronics.position_latency", (0.002, 0.015), (0.018,)),
-    ("valves.time_constant", (0.0015, 0.008), (0.012,)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "inside", "outside"),
+    [
+        ("mechanics.mass", (2.0, 5.0), (1.4, 7.0)),
+        ("electronics.position_latency", (0.002, 0.015), (0.018,)),
+        ("valves.time_constant", (0.0015, 0.008), (0.012,)),
+    ],
+)
 def test_a_rig_for_which_no_controller_is_tuned_is_named(name, inside, outside):
     for value in inside:
         assert said(name, value) == []

@@ -13,11 +13,15 @@ from birthsim_env.physics.rig.parameters import Parameters
 OWNER = Parameters()
 TRUE = OWNER.replace(
     {
-        "mechanics.mass": 3.6, "cylinder1.coulomb_friction": 16.0, "cylinder2.viscous_friction": 22.0,
-        "valves.sonic_conductance": 4.4e-9, "valves.time_constant": 0.0055, "chambers.dead_volume": 16e-6,
+        "mechanics.mass": 3.6,
+        "cylinder1.coulomb_friction": 16.0,
+        "cylinder2.viscous_friction": 22.0,
+        "valves.sonic_conductance": 4.4e-9,
+        "valves.time_constant": 0.0055,
+        "chambers.dead_volume": 16e-6,
         "electronics.position_latency": 0.006,
     }
-)  # fmt: skip
+)
 
 
 @cache

@@ -11,8 +11,8 @@ from baselines.registry import bare_name, known_options, make_controller
 from baselines.staged import CompiledDriving, Driving, driving
 from birthsim_env import Measurement, Parameters
 from birthsim_env.loop.rows import Signals, fill_measurement
-from studies.haptics.worlds import resting
-from studies.stability.maps import Cases, judge
+from lab.studies.haptics.worlds import resting
+from lab.studies.stability.maps import Cases, judge
 
 RIG = Parameters()
 T = RIG.electronics.control_period
@@ -33,9 +33,14 @@ def seen(time, position, velocity, force, late=0.0):
     place = np.array([0.5 + position, zero])
     clock = np.full(lanes, time)
     return Measurement(
-        clock, place, clock - late, np.array([np.ones(lanes) * velocity, zero]), np.full((4, lanes), 4e5),
-        np.array([np.ones(lanes) * force, zero]), late > 0,
-    )  # fmt: skip
+        clock,
+        place,
+        clock - late,
+        np.array([np.ones(lanes) * velocity, zero]),
+        np.full((4, lanes), 4e5),
+        np.array([np.ones(lanes) * force, zero]),
+        late > 0,
+    )
 
 
 def signals_of(measurement, reference):

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
-from studies.accuracy import second_model
+from lab.studies.accuracy import second_model
 from tests.oracles import linkage_by_points as by_points
 
 STATE = sp.symbols("y1 y2 v1 v2 F1 F2", real=True)

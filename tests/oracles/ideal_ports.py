@@ -5,7 +5,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from birthsim_env.physics.compiled.lanes import Array
-from studies.stability.rig_port import Hand
+from lab.studies.stability.rig_port import Hand
 
 PERIOD, ANSWERS = 1e-3, 4
 STEP = PERIOD / ANSWERS

@@ -13,7 +13,7 @@ from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.geometry import end_effector
-from studies.fuzz.odd_rigs import odd_rig
+from lab.studies.fuzz.odd_rigs import odd_rig
 
 RIG = Parameters()
 RADIUS = {"least": 0.3, "most": 0.7}

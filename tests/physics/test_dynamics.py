@@ -9,8 +9,8 @@ from birthsim_env.physics.compiled.compilation import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy import second_model
-from studies.accuracy.second_model import SecondModel
+from lab.studies.accuracy import second_model
+from lab.studies.accuracy.second_model import SecondModel
 from tests.physics.rigs import DEMANDING, LAWS, MOVED, OTHER
 
 

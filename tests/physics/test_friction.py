@@ -15,7 +15,7 @@ from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y2, Z1, Z2
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy.second_model import plastic_fraction
+from lab.studies.accuracy.second_model import plastic_fraction
 from tests.physics.rigs import LAWS, NO_FRICTION
 from tests.physics.test_dynamics import anywhere
 

@@ -8,11 +8,11 @@ import pytest
 from scipy.linalg import expm
 
 from birthsim_env import Parameters, Plant, balanced_pressures, linearize, linearize_lanes
+from birthsim_env.gradients.linear.model import LinearModel
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.linear.model import LinearModel
-from studies.gradients.states import plant_of
+from lab.studies.gradients.states import plant_of
 from tests.console import call, strict
 from tests.physics.rigs import OTHER
 

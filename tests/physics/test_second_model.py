@@ -8,8 +8,8 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
-from studies.accuracy.second_model import SecondModel
+from lab.studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
+from lab.studies.accuracy.second_model import SecondModel
 from tests.physics.rigs import DEMANDING, LAWS, OTHER
 
 ELASTO_PLASTIC = {"friction.law": "elasto_plastic"}

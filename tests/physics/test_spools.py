@@ -8,7 +8,7 @@ from birthsim_env.physics import spools
 from birthsim_env.physics.compiled.lanes import DEADBAND, parameter_array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy.motions import PERIOD, PERIODS, strong
+from lab.studies.accuracy.motions import PERIOD, PERIODS, strong
 from tests.physics.test_second_model import start
 
 CIRCLE = "BirthSIM/Circle-v1"

@@ -9,7 +9,7 @@ from birthsim_env.physics import valves
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, TEMPERATURES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy import second_model
+from lab.studies.accuracy import second_model
 
 C, B, CL = 3.9e-9, 0.30, 0.005 * 3.9e-9
 RHO0, T0, SUPPLY, ATMOSPHERE = 1.185, 293.15, 7.0e5, 1.013e5

@@ -4,7 +4,7 @@ import ast
 
 from tests.console import ROOT
 
-PACKAGES = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents", "studies", "examples")
+PACKAGES = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents", "lab", "examples")
 
 
 def bars():

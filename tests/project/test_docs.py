@@ -15,8 +15,8 @@ from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
 from birthsim.door import COMMANDS
 from birthsim_env import Parameters
-from studies.comparison import tables as comparison_tables
-from studies.scores import tables as score_tables
+from lab.studies.comparison import tables as comparison_tables
+from lab.studies.scores import tables as score_tables
 from tests.console import ROOT
 from tests.live import axe, browser
 
@@ -31,8 +31,9 @@ def with_tables(page):
 
 PAGES = {
     page.relative_to(DOCS).with_suffix("").as_posix(): with_tables(page)
-    for page in DOCS.rglob("*.md") if page.parent.name != "data"
-}  # fmt: skip
+    for page in DOCS.rglob("*.md")
+    if page.parent.name != "data"
+}
 
 FIGURE = re.compile(r"\b\d+\.\d+\b")
 
@@ -134,9 +135,11 @@ def test_a_data_file_is_chosen_from_and_sorted(page_of):
     page.get_by_label("where").select_option("all")
     page.get_by_role("button", name="error").click()
     assert seen() == [
-        ["circle", "drawn, nominal", "a", "3"], ["probe", "nominal", "a", "7"], ["circle", "nominal", "b", "12"],
+        ["circle", "drawn, nominal", "a", "3"],
+        ["probe", "nominal", "a", "7"],
+        ["circle", "nominal", "b", "12"],
         ["circle", "nominal", "a", "lost"],
-    ]  # fmt: skip
+    ]
     assert "4 of 4 rows" in page.locator("article").inner_text()
 
 

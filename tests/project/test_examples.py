@@ -1,4 +1,4 @@
-"""The example on tensors of a device; ``studies/clients`` runs those on other libraries."""
+"""The example on tensors of a device; ``lab/studies/clients`` runs those on other libraries."""
 
 import re
 import subprocess

@@ -11,7 +11,7 @@ from tests.console import ROOT
 nbformat = pytest.importorskip("nbformat")
 pytest.importorskip("jupytext")
 
-BINDER = ROOT / "binder"
+BINDER = ROOT / "packaging" / "binder"
 ADDRESSES = (
     "../notebooks/{}.ipynb", "https://colab.research.google.com/github/someone/birthsim/blob/gh-pages/notebooks/{}.ipynb",
     "https://mybinder.org/v2/gh/someone/birthsim/HEAD?labpath=docs%2Ftutorials%2F{}.ipynb",

@@ -12,7 +12,7 @@ from tests.console import ROOT
 
 LISTED = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
 PAGES = [ROOT / name for name in LISTED]
-READ_WHOLE = [ROOT / "README.md", ROOT / "paper.md"]
+READ_WHOLE = [ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md"]
 """Pages in plain CommonMark, without MyST's roles and directives."""
 
 READER = MarkdownIt("commonmark").enable(["table", "strikethrough"]).use(front_matter_plugin).use(dollarmath_plugin)

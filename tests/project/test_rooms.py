@@ -85,7 +85,7 @@ GIVEN = {"baselines/estimation/hand/quiet_force.py": {f"{name}[{axis}, i]" for n
 
 def test_kernels_name_their_rows():
     found = []
-    for path in (one for name in ("birthsim_env", "baselines", "agents", "studies") for one in (ROOT / name).rglob("*.py")):
+    for path in (one for name in ("birthsim_env", "baselines", "agents", "lab") for one in (ROOT / name).rglob("*.py")):
         place = path.relative_to(ROOT).as_posix()
         if place != HASH and "/physics/" not in place:
             by_number = set(rows_by_number(path.read_text(encoding="utf-8")))

@@ -12,7 +12,7 @@ import yaml
 import birthsim_env
 from tests.console import ROOT
 
-LOCKS = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "requirements").glob("*.txt")}
+LOCKS = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "packaging" / "requirements").glob("*.txt")}
 PINS = {name: dict(re.findall(r"^([A-Za-z0-9._-]+)==([^\s;]+)", text, re.MULTILINE)) for name, text in LOCKS.items()}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # sha256sum of dist/ and LICENSE in npm's uplot-1.6.32.tgz
@@ -63,8 +63,8 @@ def test_every_dependency_of_the_project_is_locked():
 
 def test_the_papers_of_a_release_agree():
     """CITATION.cff, codemeta.json and the conda recipe with the package; the recipe asks for what pyproject.toml asks for."""
-    recipe = yaml.safe_load((ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
-    codemeta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    codemeta = json.loads((ROOT / "packaging" / "codemeta.json").read_text(encoding="utf-8"))
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert {citation["version"], codemeta["version"], recipe["context"]["version"]} == {birthsim_env.__version__}
     asked = {one.replace(" ", "").replace("-base", "") for one in recipe["requirements"]["run"]}
@@ -75,7 +75,7 @@ def test_the_papers_of_a_release_agree():
 def test_what_is_vendored_is_the_published_package():
     folder = ROOT / "birthsim_live" / "page" / "vendor"
     assert {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()} == UPLOT
-    named = (ROOT / "THIRD_PARTY.md").read_text(encoding="utf-8")
+    named = (ROOT / "packaging" / "THIRD_PARTY.md").read_text(encoding="utf-8")
     version = re.search(r"\(v([\d.]+)\)", (folder / "uPlot.esm.js").read_text(encoding="utf-8"))[1]
     assert [name for name in UPLOT if name not in named] == []
     assert f"| {version} | MIT" in named

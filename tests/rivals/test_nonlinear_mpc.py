@@ -14,7 +14,7 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_colu
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.comparison.grid import default_controllers
+from lab.studies.comparison.grid import default_controllers
 from tests.contracts.test_controllers import recorded
 from tests.controllers.test_informed import Aware
 from tests.oracles import closed_loop, derived_law, rigid_body

@@ -10,10 +10,10 @@ from itertools import repeat
 import numpy as np
 import pytest
 
-from studies.fuzz import harness, odd_rigs
-from studies.fuzz.harness import Case, Kind, fuzz
-from studies.fuzz.kinds import KINDS
-from studies.fuzz.mutations import nested
+from lab.studies.fuzz import harness, odd_rigs
+from lab.studies.fuzz.harness import Case, Kind, fuzz
+from lab.studies.fuzz.kinds import KINDS
+from lab.studies.fuzz.mutations import nested
 from tests.console import ROOT
 
 

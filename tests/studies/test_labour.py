@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 
 from birthsim_env.parts.own_parts import stiffness_of, trajectory_of
 from birthsim_env.parts.references import Path
-from studies.labour.model import Labour
+from lab.studies.labour.model import Labour
 
 FASTER = 25.0
 EVEN = replace(Labour(), floor_yield_force=35.0, floor_stiffness=3500.0, outlet=10.0)

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from studies import leaderboard
+from lab.studies import leaderboard
 
 
 def test_the_table_is_that_of_the_entries():
@@ -42,12 +42,35 @@ def changed(folder, **arguments):
 MARK = "from pathlib import Path\nPath(__file__).with_name('ran').touch()\nclass Own: pass\n"
 
 
-@pytest.mark.parametrize("name", [
-    "{elsewhere}/own.py:Own", "../elsewhere/own.py:Own", "link.py:Own", "./own.py:Own", "own.txt:Own", "gone.py:Own",
-    "folder/own.py:Own", "own.py:Own[a=1]", "limited:own.py:Own", "residual:../elsewhere", "residual:{elsewhere}",
-    "residual:linked", "residual", "residual[policy={elsewhere}]", "--out=x", "--help", "-h", "pid --out x",
-    "pid[bandwidth=nan]", "pid[bandwith=60]", "pid[bandwidth=60", "", "pid\n", "backsteping",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        "{elsewhere}/own.py:Own",
+        "../elsewhere/own.py:Own",
+        "link.py:Own",
+        "./own.py:Own",
+        "own.txt:Own",
+        "gone.py:Own",
+        "folder/own.py:Own",
+        "own.py:Own[a=1]",
+        "limited:own.py:Own",
+        "residual:../elsewhere",
+        "residual:{elsewhere}",
+        "residual:linked",
+        "residual",
+        "residual[policy={elsewhere}]",
+        "--out=x",
+        "--help",
+        "-h",
+        "pid --out x",
+        "pid[bandwidth=nan]",
+        "pid[bandwith=60]",
+        "pid[bandwidth=60",
+        "",
+        "pid\n",
+        "backsteping",
+    ],
+)
 def test_an_entry_runs_nothing_but_registered_names_and_files_beside_it(name, tmp_path, monkeypatch):
     beside, elsewhere = tmp_path / "entries", tmp_path / "elsewhere"
     for folder in (beside, elsewhere, beside / "folder"):
@@ -63,11 +86,25 @@ def test_an_entry_runs_nothing_but_registered_names_and_files_beside_it(name, tm
     assert not list(tmp_path.rglob("ran"))
 
 
-@pytest.mark.parametrize("arguments", [
-    {"env": "--help"}, {"env": "BirthSIM/Moon-v1"}, {"policy": "circle"}, {"controller": ["pid", "lqr"]}, {"controller": []},
-    {"seed": 80000.0}, {"seed": True}, {"seed": None}, {"parameters": "rig.toml"}, {"reference": "own.py:Own"}, {"out": "/"},
-    {"--out": "x"}, {"stiffness": []},
-], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"env": "--help"},
+        {"env": "BirthSIM/Moon-v1"},
+        {"policy": "circle"},
+        {"controller": ["pid", "lqr"]},
+        {"controller": []},
+        {"seed": 80000.0},
+        {"seed": True},
+        {"seed": None},
+        {"parameters": "rig.toml"},
+        {"reference": "own.py:Own"},
+        {"out": "/"},
+        {"--out": "x"},
+        {"stiffness": []},
+    ],
+    ids=str,
+)
 def test_an_entry_has_no_other_arguments(arguments, tmp_path, monkeypatch):
     monkeypatch.setattr(leaderboard.subprocess, "run", lambda *_, **__: pytest.fail("a command was run"))
     assert "allowed" in leaderboard.problem(changed(tmp_path, **arguments))

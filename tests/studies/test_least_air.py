@@ -9,8 +9,8 @@ import pytest
 
 from baselines.bench.pneumatic_range import pneumatic_range
 from birthsim_env import Circle, Hold, Parameters, Path, StiffnessSchedule
-from studies.least_air import schedule as module
-from studies.least_air.schedule import GRID, least_air, supplied
+from lab.studies.least_air import schedule as module
+from lab.studies.least_air.schedule import GRID, least_air, supplied
 from tests.console import ROOT, call, strict
 from tests.oracles import derived_law
 

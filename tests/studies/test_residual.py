@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from agents.policy.seeds import SHIPPED
-from studies.residual import beside_law, own_motion
+from lab.studies.residual import beside_law, own_motion
 from tests.console import call
 
 LAW = "backstepping-force-first"

@@ -3,11 +3,11 @@
 import pytest
 
 from birthsim_env.physics.compiled.sources import ROOT, hashes
-from studies import results, shelf
-from studies.results import changed, provenance, read_result, written
+from lab.studies import results, shelf
+from lab.studies.results import changed, provenance, read_result, written
 from tests.console import call
 
-MODULE = "studies.stability.stiffest"
+MODULE = "lab.studies.stability.stiffest"
 
 
 def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_path):
@@ -19,7 +19,7 @@ def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_pa
     assert len(result["commit"]) == 40
     assert set(result["versions"]) == {"python", "numpy", "numba", "scipy", "gymnasium"}
     assert changed(result, (MODULE,)) == []
-    assert not {path for path in result["sources"] if path.startswith("tests/") or path == "studies/door.py"}
+    assert not {path for path in result["sources"] if path.startswith("tests/") or path == "lab/studies/door.py"}
     result["sources"]["baselines/registry.py"] = "0"
     del result["sources"]["baselines/staged.py"]
     assert changed(result, (MODULE,)) == ["baselines/registry.py", "baselines/staged.py"]
@@ -59,7 +59,7 @@ def test_every_declared_study_measures_with_files_that_there_are_and_has_a_state
 
 
 def test_every_stored_result_belongs_to_a_study():
-    stored = {path.stem for path in (ROOT / "results").glob("*.json")}
+    stored = {path.stem for path in (ROOT / "lab" / "results").glob("*.json")}
     assert stored <= set(shelf.names())
 
 

@@ -6,9 +6,9 @@ import pytest
 from baselines.bench.resting import RestingRigs
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from studies.sensorless.study import RIGS
-from studies.sensorless.told import Told
-from studies.shaken import at_rest
+from lab.studies.sensorless.study import RIGS
+from lab.studies.sensorless.told import Told
+from lab.studies.shaken import at_rest
 from tests.console import ROOT
 
 OTHER = {"mechanics.mass": 3.4, "cylinder1.coulomb_friction": 14.0, "electronics.position_latency": 0.009}

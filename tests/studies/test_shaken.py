@@ -6,8 +6,8 @@ import pytest
 from baselines.impedance import Impedance
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
-from studies import shaken
-from studies.haptics.worlds import Condition
+from lab.studies import shaken
+from lab.studies.haptics.worlds import Condition
 
 LANES = 2
 

@@ -6,9 +6,9 @@ import pytest
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.accuracy.motions import PERIOD, strong
-from studies.accuracy.second_model import SecondModel, rates
-from studies.strangers.model import RESERVOIR, STEP, Strangeness, Stranger, strange_rates
+from lab.studies.accuracy.motions import PERIOD, strong
+from lab.studies.accuracy.second_model import SecondModel, rates
+from lab.studies.strangers.model import RESERVOIR, STEP, Strangeness, Stranger, strange_rates
 
 pytestmark = pytest.mark.slow
 

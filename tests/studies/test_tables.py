@@ -5,10 +5,10 @@ import re
 import pytest
 
 from birthsim_env.physics.compiled.sources import ROOT
-from studies.figures import figure
-from studies.results import read_result
-from studies.shelf import texts
-from studies.tables import markdown
+from lab.studies.figures import figure
+from lab.studies.results import read_result
+from lab.studies.shelf import texts
+from lab.studies.tables import markdown
 
 TOLD = {"admittance-backstepping", "admittance-adaptive", "pid", "lqr", "sliding-mode"}
 """Controllers of the comparison that a force sensor tells of the hand."""
@@ -52,12 +52,15 @@ def test_the_comparison_marks_the_least_error_of_those_told_the_same(force: bool
     assert marked == [error == min(errors) for error in errors]
 
 
-QUOTED = sorted({
-    (path.relative_to(ROOT).as_posix(), name)
-    for path in [ROOT / "README.md", ROOT / "paper.md", *(ROOT / "docs").rglob("*.md")]
-    for pair in re.findall(r"\{figure\}`([^`]+)`|<!-- figure ([^>]+) -->", path.read_text(encoding="utf-8"))
-    for name in pair if name
-})  # fmt: skip
+QUOTED = sorted(
+    {
+        (path.relative_to(ROOT).as_posix(), name)
+        for path in [ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md", *(ROOT / "docs").rglob("*.md")]
+        for pair in re.findall(r"\{figure\}`([^`]+)`|<!-- figure ([^>]+) -->", path.read_text(encoding="utf-8"))
+        for name in pair
+        if name
+    }
+)
 
 
 @pytest.mark.parametrize(("page", "name"), QUOTED)

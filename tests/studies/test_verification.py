@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from studies.mutation.modules import MODULES
-from studies.verification import balances, mutants, report, sources
+from lab.studies.mutation.modules import MODULES
+from lab.studies.verification import balances, mutants, report, sources
 
 TABLES = {name: report.entries(name) for name in ("equation", "promise")}
 NODES = sorted({node for table in TABLES.values() for entry in table for node in entry["tests"]})
@@ -122,7 +122,7 @@ def test_balances_close_at_the_plants_step(monkeypatch):
 def test_stages_run_as_plain_python():
     """What mutants and coverage rely on: a whole closed loop without machine code gives the compiled openings."""
     script = (
-        "import sys; from studies.mutation.uncompiled import switch_off\n"
+        "import sys; from lab.studies.mutation.uncompiled import switch_off\n"
         "if len(sys.argv) > 1: switch_off()\n"
         "import numpy as np; from baselines import BacksteppingController\n"
         "from birthsim_env.physics.geometry import s_squared\n"

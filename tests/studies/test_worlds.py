@@ -10,15 +10,15 @@ import birthsim_env  # noqa: F401
 from baselines.bench.evaluation import batches
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.bandwidth import study as bandwidth
-from studies.comparison import study as comparison
-from studies.comparison.grid import Conditions, as_described, run_cell, settings_of
-from studies.comparison.headline import CONTROLLERS, is_shown, learns_mass
-from studies.comparison.told import TOLD, evaluate_told, told_law
-from studies.leaderboard import RULES, TABLE, table
-from studies.results import read_result
-from studies.shelf import declared, names, texts
-from studies.worlds import COUNT, SEED, worlds
+from lab.studies.bandwidth import study as bandwidth
+from lab.studies.comparison import study as comparison
+from lab.studies.comparison.grid import Conditions, as_described, run_cell, settings_of
+from lab.studies.comparison.headline import CONTROLLERS, is_shown, learns_mass
+from lab.studies.comparison.told import TOLD, evaluate_told, told_law
+from lab.studies.leaderboard import RULES, TABLE, table
+from lab.studies.results import read_result
+from lab.studies.shelf import declared, names, texts
+from lab.studies.worlds import COUNT, SEED, worlds
 
 CIRCLE = "BirthSIM/Circle-v1"
 PAPER = ("figure4",)
@@ -106,8 +106,10 @@ def test_policies_stand_in_the_columns_of_their_sensors():
     assert shown["backstepping"] == shown[f"{TOLD}backstepping"] == [True, True]
     assert not is_shown("backstepping", Conditions(CIRCLE, "lab", "randomised", "sine"))
     assert [name for name in CONTROLLERS if learns_mass(name)] == [
-        "admittance-adaptive", f"{TOLD}admittance-adaptive", "residual:circle_honest_apg",
-    ]  # fmt: skip
+        "admittance-adaptive",
+        f"{TOLD}admittance-adaptive",
+        "residual:circle_honest_apg",
+    ]
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 5, 256, 260, 600])

@@ -1,4 +1,4 @@
-"""``studies.honest.worst``: the worst worlds, drawn and found, and what the found one owes to each of its figures."""
+"""``lab.studies.honest.worst``: the worst worlds, drawn and found, and what the found one owes to each of its figures."""
 
 import gymnasium
 import numpy as np
@@ -10,7 +10,7 @@ from birthsim_env.parts.drawn.randomization import documented_ranges, draw_param
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.honest import search, worst
+from lab.studies.honest import search, worst
 
 SEED = 300
 RIG = Parameters()

@@ -6,7 +6,7 @@ import tracemalloc
 import pytest
 
 from agents.training.configuration import TrainingSettings, override
-from studies.sweeps.plan import HeatMap, Range, load_sweep
+from lab.studies.sweeps.plan import HeatMap, Range, load_sweep
 
 WHOLE = """
 [base]

@@ -12,9 +12,9 @@ from optuna.storages.journal import JournalFileBackend
 
 from baselines import evaluate, make_controller
 from birthsim_env import Parameters
-from studies.results import read_result
-from studies.sweeps.plan import load_sweep
-from studies.sweeps.study import EXAMPLE
+from lab.studies.results import read_result
+from lab.studies.sweeps.plan import load_sweep
+from lab.studies.sweeps.study import EXAMPLE
 from tests.console import call
 
 GRID = """

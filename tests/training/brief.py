@@ -7,9 +7,17 @@ import numpy as np
 from agents.training.configuration import TrainingSettings
 
 TINY = TrainingSettings(
-    "BirthSIM/ProbeResidual-v2", steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
-    validation_lanes=2, validations=4,
-)  # fmt: skip
+    "BirthSIM/ProbeResidual-v2",
+    steps=1024,
+    lanes=8,
+    rollout=16,
+    batch=64,
+    epochs=1,
+    gradient_steps=1,
+    hidden=(8, 8),
+    validation_lanes=2,
+    validations=4,
+)
 
 
 def steady(curve):

@@ -80,8 +80,10 @@ def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
     layers = list(training.hidden)
     policy = eval(zoo["policy_kwargs"], {"nn": torch.nn, "dict": dict})  # as RL-Zoo reads it
     assert policy == {
-        "log_std_init": training.log_std, "activation_fn": torch.nn.Tanh, "net_arch": {"pi": layers, "vf": layers},
-    }  # fmt: skip
+        "log_std_init": training.log_std,
+        "activation_fn": torch.nn.Tanh,
+        "net_arch": {"pi": layers, "vf": layers},
+    }
     arguments = {"sensors": training.sensors, "randomize": training.randomize}
     assert zoo["env_kwargs"].items() <= {**residual.to_dict(), **arguments}.items()
     assert arguments.items() <= zoo["env_kwargs"].items()

@@ -10,9 +10,17 @@ from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
 
 SHORT = TrainingSettings(
-    environment="BirthSIM/ProbeResidual-v2", algorithm="apg", steps=20_480, lanes=32, rollout=8, learning_rate=5e-3,
-    discount=1.0, hidden=(32, 32), validation_lanes=8, validations=2,
-)  # fmt: skip
+    environment="BirthSIM/ProbeResidual-v2",
+    algorithm="apg",
+    steps=20_480,
+    lanes=32,
+    rollout=8,
+    learning_rate=5e-3,
+    discount=1.0,
+    hidden=(32, 32),
+    validation_lanes=8,
+    validations=2,
+)
 PURE = ResidualSettings(law="none", policy_period=0.02)
 BESIDE = replace(SHORT, target="impedance", beside=("BirthSIM/ProbeResidual-v2 guided",))
 INFORMED = replace(PURE, informed=True)

@@ -159,7 +159,7 @@ def test_every_value_is_less_by_the_same(rewards, truncated, discount):
 def test_every_observation_has_the_figures_of_its_own_episode():
     lanes = gymnasium.make_vec(
         "BirthSIM/ProbeResidual-v2", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
-    )  # fmt: skip
+    )
     env = Privileged(SB3VecEnv(lanes, staggered=True))
     env.seed(0)
     seen, ends = env.reset(), 0

@@ -23,7 +23,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import evaluate_piece
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.scores.study import _contestants
+from lab.studies.scores.study import _contestants
 
 
 def evaluation(name, error, lost=(), beyond=()):
@@ -172,9 +172,10 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkey
     """Once round the circle each way instead of twice."""
     follow = inspection._follow
     monkeypatch.setattr(
-        inspection, "_follow",
+        inspection,
+        "_follow",
         lambda policy, settings, lanes, time, *what: follow(policy, settings, lanes, min(time, 8.0), *what),
-    )  # fmt: skip
+    )
     policy = load_policy(best_policy("circle"))
     assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
     for unknown, half in zip(*friction_along_circle(policy), strict=True):

@@ -53,9 +53,16 @@ def teachers(tmp_path_factory):
     folder = tmp_path_factory.mktemp("teachers")
     for seed in (0, 1):
         settings = TrainingSettings(
-            "BirthSIM/ProbeResidual-v2", steps=64, seed=seed, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1,
+            "BirthSIM/ProbeResidual-v2",
+            steps=64,
+            seed=seed,
+            lanes=4,
+            rollout=8,
+            batch=32,
+            validation_lanes=4,
+            validations=1,
             privileged=True,
-        )  # fmt: skip
+        )
         train(settings, ResidualSettings(force_sensor=False), folder / f"seed_{seed}")
     return folder
 

@@ -30,9 +30,17 @@ from tests.training.brief import steady
 PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(
-    PROBE, steps=30_000, lanes=32, rollout=32, batch=256, epochs=4, hidden=(32, 32), learning_rate=2e-3,
-    validation_lanes=8, validations=2,
-)  # fmt: skip
+    PROBE,
+    steps=30_000,
+    lanes=32,
+    rollout=32,
+    batch=256,
+    epochs=4,
+    hidden=(32, 32),
+    learning_rate=2e-3,
+    validation_lanes=8,
+    validations=2,
+)
 """On 4.5 s of the stiffness test, a few seconds are enough to take a third off the law's error."""
 BRIEF = replace(SMALL, steps=2048, lanes=16, validation_lanes=4, validations=2)
 
@@ -217,7 +225,7 @@ def test_a_full_disk_is_said_once_with_the_place_and_without_a_traceback(tmp_pat
 def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
     settings = TrainingSettings(
         "BirthSIM/ProbeResidual-v2", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
-    )  # fmt: skip
+    )
     train(settings, ResidualSettings(), tmp_path)
     policy = load_policy(tmp_path)
     assert policy.training["privileged"] is True

@@ -55,17 +55,28 @@ def _make_model(settings: TrainingSettings, env: VecNormalize, tensorboard: str 
     policy: dict[str, Any] = {"activation_fn": torch.nn.Tanh, "log_std_init": settings.log_std}
     if settings.algorithm == "ppo":
         model: Any = PPO(
-            "MlpPolicy", env, n_steps=settings.rollout, n_epochs=settings.epochs, gae_lambda=settings.gae_lambda,
-            policy_kwargs={**policy, "net_arch": {"pi": hidden, "vf": hidden}}, **shared,
-        )  # fmt: skip
+            "MlpPolicy",
+            env,
+            n_steps=settings.rollout,
+            n_epochs=settings.epochs,
+            gae_lambda=settings.gae_lambda,
+            policy_kwargs={**policy, "net_arch": {"pi": hidden, "vf": hidden}},
+            **shared,
+        )
         # PPO's spread is a parameter of its own.
         _begin_at_zero(model.policy.action_net)
         return model
     kind = SAC if settings.algorithm == "sac" else TQC
     model = kind(
-        "MlpPolicy", env, train_freq=1, gradient_steps=settings.gradient_steps, buffer_size=BUFFER,
-        learning_starts=20 * settings.lanes, policy_kwargs={**policy, "net_arch": {"pi": hidden, "qf": [128, 128]}}, **shared,
-    )  # fmt: skip
+        "MlpPolicy",
+        env,
+        train_freq=1,
+        gradient_steps=settings.gradient_steps,
+        buffer_size=BUFFER,
+        learning_starts=20 * settings.lanes,
+        policy_kwargs={**policy, "net_arch": {"pi": hidden, "qf": [128, 128]}},
+        **shared,
+    )
     _begin_at_zero(model.policy.actor.mu)
     _begin_at_zero(model.policy.actor.log_std, settings.log_std)
     return model

@@ -95,7 +95,7 @@ def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: floa
 @helper
 def predict(
     b: Bristled, k: int, i: int, load: float, own: float, answer: float, push_noise: float, unseen: float, p: Rig, period: float
-) -> None:  # fmt: skip
+) -> None:
     """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
     forces; ``answer``, 1/kg, to a force; ``push_noise``, N2/s, that drives f; ``unseen``, the part of the variance of v that is
     motion, which wears bristles down, rather than ignorance of a piston that rests."""

@@ -13,9 +13,18 @@ LATE = 0.002
 
 @helper
 def carry(
-    b: Bristled, i: int, joints: Joints, air: PerChamber, pose: tuple[float, ...], noise: float, push_noise: float,
-    unseen: float, p: Rig, period: float, new: bool,
-) -> tuple[float, float]:  # fmt: skip
+    b: Bristled,
+    i: int,
+    joints: Joints,
+    air: PerChamber,
+    pose: tuple[float, ...],
+    noise: float,
+    push_noise: float,
+    unseen: float,
+    p: Rig,
+    period: float,
+    new: bool,
+) -> tuple[float, float]:
     """Carries both pistons of lane ``i`` on by a period, or starts them where ``joints`` are; forces of the chambers, N.
 
     ``noise``, m, is that of a position sample; ``push_noise`` and ``unseen`` are those of ``bristle_filter.predict``.

@@ -43,9 +43,15 @@ def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig,
     share, left = period / (1.0 / QUICKNESS + period), PerPiston(unexplained)
     for i in range(time.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
-            p.sin_gamma3, p.cos_gamma3,
-        )  # fmt: skip
+            joints.position[0, i],
+            joints.position[1, i],
+            p.k1,
+            p.k2,
+            p.d_squares,
+            p.d_product,
+            p.sin_gamma3,
+            p.cos_gamma3,
+        )
         new = fresh[i] > 0.0
         for cylinder in range(2):
             most = (p.fc1 if cylinder == 0 else p.fc2) / p.s0

@@ -44,9 +44,17 @@ are not seen, a third of what the filter believes. Found by trial; with 0 bristl
 
 @helper
 def observe(
-    hand: Hand, felt: Felt, hold: Hold, seen: Signals, moving: Moving, joints: Joints, pressures: Array, noise: Array,
-    about: Belief, fresh: Array,
-) -> None:  # fmt: skip
+    hand: Hand,
+    felt: Felt,
+    hold: Hold,
+    seen: Signals,
+    moving: Moving,
+    joints: Joints,
+    pressures: Array,
+    noise: Array,
+    about: Belief,
+    fresh: Array,
+) -> None:
     """Carries ``hand``, ``felt`` and ``hold`` on by one period; ``moving`` is the end effector, ``pressures`` (4, N), Pa, the
     chambers', ``noise`` (N,), m, that of a position sample."""
     p, period, b, air = about.rig, about.period, felt.pistons, PerChamber(pressures)

@@ -84,11 +84,16 @@ def shared(electronics: Electronics, rate: float) -> Array:
     """``Shared``; ``rate`` is the tracker's, Hz."""
     e = electronics
     return Shared.numbers(
-        period=e.control_period, rate=rate, registration=(e.registration_x, e.registration_y),
-        transmitter=(e.transmitter_x, e.transmitter_y), force_range=e.force_range, pressure_range=e.pressure_range,
-        stamped=e.position_latency, share=acceleration.passed(e.acceleration_bandwidth, e.control_period),
+        period=e.control_period,
+        rate=rate,
+        registration=(e.registration_x, e.registration_y),
+        transmitter=(e.transmitter_x, e.transmitter_y),
+        force_range=e.force_range,
+        pressure_range=e.pressure_range,
+        stamped=e.position_latency,
+        share=acceleration.passed(e.acceleration_bandwidth, e.control_period),
         acceleration_noise=e.acceleration_noise,
-    )  # fmt: skip
+    )
 
 
 @helper

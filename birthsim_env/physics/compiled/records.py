@@ -31,9 +31,14 @@ class Group(Generic[V]):
     """
 
     def __init__(
-        self, count: int, units: tuple[str, ...], about: str, names: tuple[str, ...] = (), layout: "type[Rows] | None" = None,
+        self,
+        count: int,
+        units: tuple[str, ...],
+        about: str,
+        names: tuple[str, ...] = (),
+        layout: "type[Rows] | None" = None,
         single: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.count, self.units, self.about, self.names, self.layout, self.single = count, units, about, names, layout, single
         self.first = 0
 

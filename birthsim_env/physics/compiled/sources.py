@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 
 ROOT = Path(__file__).resolve().parents[3]
-PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "studies")
+PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "lab")
 
 _NAMED = re.compile(r"([A-Za-z_]\w*(?:\.\w+)+)(?::\w+)?")
 """A string that may name a module, as in "package.module:name"."""

@@ -55,9 +55,14 @@ class Mechanics(Part):
     stop_damping: float = quantity(1.0, "s/m", "assumed; force k p (1 + c dp/dt), Hunt and Crossley 1975", least=0, most=2)
     impact_speed: float = quantity(0.1, "m/s", "assumed; a faster collision with an end stop is reported", above=0, most=100)
     mode_frequency: float = quantity(
-        0.0, "Hz", "0 is rigid; natural frequency of the handle with the linkage held, 19 to 60 assumed", least=0, most=200,
-        option=True, worth=(19, 60),
-    )  # fmt: skip
+        0.0,
+        "Hz",
+        "0 is rigid; natural frequency of the handle with the linkage held, 19 to 60 assumed",
+        least=0,
+        most=200,
+        option=True,
+        worth=(19, 60),
+    )
     mode_damping: float = quantity(
         0.03, "-", "assumed; damping ratio of the handle on the structure", least=0, most=1, option=True, worth=(0.01, 0.1)
     )
@@ -100,13 +105,23 @@ class Chambers(Part):
     )
     piston_conductance: float = quantity(0.012, "W/K", "assumed; G12, heat between the chambers of a cylinder", least=0, most=5)
     tube_length: float = quantity(
-        0.0, "m", "0 is none; between valve and chamber, its volume comes on top of the dead volume, 0.5 to 3 assumed", least=0,
-        most=10, option=True, worth=(0.5, 3),
-    )  # fmt: skip
+        0.0,
+        "m",
+        "0 is none; between valve and chamber, its volume comes on top of the dead volume, 0.5 to 3 assumed",
+        least=0,
+        most=10,
+        option=True,
+        worth=(0.5, 3),
+    )
     tube_diameter: float = quantity(
-        0.004, "m", "of the tube's bore, data sheets of tubes with 6 mm outside", least=1e-3, most=0.02, option=True,
+        0.004,
+        "m",
+        "of the tube's bore, data sheets of tubes with 6 mm outside",
+        least=1e-3,
+        most=0.02,
+        option=True,
         worth=(0.0025, 0.006),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -147,13 +162,23 @@ class Air(Part):
     reference_density: float = quantity(1.185, "kg/m3", "ISO 6358; rho0", least=0.01, most=100)
     reference_temperature: float = quantity(293.15, "K", "ISO 6358; T0", least=100, most=1000)
     supply_conductance: float = quantity(
-        0.0, "m3/(s Pa)", "0 is an ideal supply; sonic conductance of the line to the reservoir, assumed, one to five "
-        "times that of a valve", least=0, most=1e-7, option=True, worth=(4e-9, 2e-8),
-    )  # fmt: skip
+        0.0,
+        "m3/(s Pa)",
+        "0 is an ideal supply; sonic conductance of the line to the reservoir, assumed, one to five times that of a valve",
+        least=0,
+        most=1e-7,
+        option=True,
+        worth=(4e-9, 2e-8),
+    )
     supply_volume: float = quantity(
-        4e-4, "m3", "data sheets of small reservoirs, 0.1 to 2 l; between the supply line and the valves", least=5e-5, most=10,
-        option=True, worth=(1e-4, 2e-3),
-    )  # fmt: skip
+        4e-4,
+        "m3",
+        "data sheets of small reservoirs, 0.1 to 2 l; between the supply line and the valves",
+        least=5e-5,
+        most=10,
+        option=True,
+        worth=(1e-4, 2e-3),
+    )
 
     def _check_together(self) -> None:
         if self.supply_pressure <= self.atmospheric_pressure:

@@ -12,7 +12,7 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_live.rig.folder import packed_page, write_page
 from birthsim_live.rig.words import LEARNING
-from studies.targets.reference import SHARED, loop_rows
+from lab.studies.targets.reference import SHARED, loop_rows
 from tests.build.targets import assert_same_bits
 from tests.live.rig.worker import run
 
@@ -88,9 +88,12 @@ def on_the_circle(name, sensors):
 
 def test_a_law_a_policy_hands_and_another_rig(page):
     check(
-        page, (on_the_circle("backstepping", "lab"), None), (on_the_circle("residual:circle", "ideal"), None),
-        ({"controller": "backstepping", "compare": "admittance-backstepping"}, PULL), (ANOTHER, HARD),
-    )  # fmt: skip
+        page,
+        (on_the_circle("backstepping", "lab"), None),
+        (on_the_circle("residual:circle", "ideal"), None),
+        ({"controller": "backstepping", "compare": "admittance-backstepping"}, PULL),
+        (ANOTHER, HARD),
+    )
 
 
 @pytest.mark.slow

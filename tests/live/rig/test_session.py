@@ -88,8 +88,9 @@ def test_more_damping_is_a_slower_answer(page):
     names, factors = ("backstepping-frozen", "admittance-backstepping", "pid"), (1.0, 2.0)
     cases = [
         [("set", {"controller": name, "damping": factor, "friction": 0.0}), ("advance", 10), held(0.53, 0.0), ("advance", 60)]
-        for name in names for factor in factors
-    ]  # fmt: skip
+        for name in names
+        for factor in factors
+    ]
     found = [told[-1] for told in run(page, *cases)]
     for little, much in zip(found[::2], found[1::2], strict=True):
         assert little.settings["damping_applies"] is True
@@ -131,9 +132,18 @@ def test_what_is_compared_starts_anew_and_all_else_goes_on(page):
 
 def test_one_hand_pulls_both_and_both_stand_still_where_one_is_lost(page):
     _, _, pulled, _, pushed, _, lost, still = run(
-        page, [("set", {"compare": "admittance-backstepping"}), held(0.54, 0.0), ("advance", 800),
-               ("hold", {"force": [20.0, 0.0]}), ("advance", 10), ("put", ["Pp1", 3e6, True]), ("advance", 5), ("advance", 5)]
-    )[0]  # fmt: skip
+        page,
+        [
+            ("set", {"compare": "admittance-backstepping"}),
+            held(0.54, 0.0),
+            ("advance", 800),
+            ("hold", {"force": [20.0, 0.0]}),
+            ("advance", 10),
+            ("put", ["Pp1", 3e6, True]),
+            ("advance", 5),
+            ("advance", 5),
+        ],
+    )[0]
     drag, pointer = SLICES["drag_force"], SLICES["pointer"]
     assert np.array_equal(pulled.of("pointer"), pulled.second_row[-1, pointer])
     assert pulled.of("drag_force")[0] > pulled.second_row[-1, drag][0] + 1  # dry friction keeps the first head back

@@ -11,7 +11,7 @@ from starlette.websockets import WebSocketDisconnect
 from birthsim_env.loop.rows import ASKED, OPENING, WORLD, Signals
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import offer, packed_page
-from studies.targets.reference import whole_rows
+from lab.studies.targets.reference import whole_rows
 from tests.live.server.conftest import HERE
 
 SOCKET = "ws://127.0.0.1:8000/controller?name="

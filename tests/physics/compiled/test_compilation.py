@@ -112,7 +112,7 @@ def test_imports_stand_anywhere_and_names_in_strings_count_where_asked_for(tmp_p
     assert found[False] == {
         *(f"birthsim_env/{name}.py" for name in ("reward", "info", "scores", "loop/rows")),
         *(f"birthsim_env/physics/compiled/{name}.py" for name in ("lanes", "exact")),
-    }  # fmt: skip
+    }
     assert found[True] - found[False] == {"baselines/registry.py"}
 
 

@@ -15,9 +15,9 @@ from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, field_of
-from studies.accuracy import second_model
-from studies.accuracy.motions import PERIOD, strong
-from studies.accuracy.second_model import SCALES, SecondModel
+from lab.studies.accuracy import second_model
+from lab.studies.accuracy.motions import PERIOD, strong
+from lab.studies.accuracy.second_model import SCALES, SecondModel
 
 CIRCLE = "BirthSIM/Circle-v1"
 LINE = {"air.supply_conductance": 4e-9, "air.supply_volume": 1e-4}
@@ -26,9 +26,11 @@ HANDLE = {"mechanics.mode_frequency": 25.0, "mechanics.mode_damping": 0.05, "mec
 EACH = {"line": LINE, "tube": TUBE, "handle": HANDLE, "all": {**LINE, **TUBE, **HANDLE}}
 WORTH = {
     f"{section.name}.{field.name}": field.metadata["worth"]
-    for section in dataclasses.fields(Parameters) if section.name != "ranges"
-    for field in dataclasses.fields(section.default) if field.metadata["worth"]
-}  # fmt: skip
+    for section in dataclasses.fields(Parameters)
+    if section.name != "ranges"
+    for field in dataclasses.fields(section.default)
+    if field.metadata["worth"]
+}
 
 
 class OtherOptions:

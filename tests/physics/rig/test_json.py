@@ -65,16 +65,25 @@ def test_what_fits_a_schema_has_no_fault():
         assert fault({**GOOD, **change}, SCHEMA) == ""
 
 
-@pytest.mark.parametrize(("change", "place", "allowed"), [
-    ({"word": 1}, ".word = 1", "text"), ({"word": None}, ".word = None", "text"), ({"count": 4}, ".count = 4", "1 to 3"),
-    ({"count": True}, ".count = True", "1 to 3"), ({"count": 2.0}, ".count = 2.0", "1 to 3"),
-    ({"flag": 1}, ".flag = 1", "true or false"),
-    ({"size": True}, ".size = True", "a number or null"), ({"size": "nan"}, ".size = 'nan'", "a number or null"),
-    ({"more": {}}, ".more lacks 'inner'", "inner"), ({"more": []}, ".more = []", "an object with inner"),
-    ({"each": {"b": []}}, ".each.'b' = []", "a list of at least 1"),
-    ({"each": {"b": [1, None]}}, ".each.'b'[1] = None", "a number"),
-    ({"each": [1]}, ".each = [1]", "an object"), ({"word": "x" * 90_000 + "\n"}, "", ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "place", "allowed"),
+    [
+        ({"word": 1}, ".word = 1", "text"),
+        ({"word": None}, ".word = None", "text"),
+        ({"count": 4}, ".count = 4", "1 to 3"),
+        ({"count": True}, ".count = True", "1 to 3"),
+        ({"count": 2.0}, ".count = 2.0", "1 to 3"),
+        ({"flag": 1}, ".flag = 1", "true or false"),
+        ({"size": True}, ".size = True", "a number or null"),
+        ({"size": "nan"}, ".size = 'nan'", "a number or null"),
+        ({"more": {}}, ".more lacks 'inner'", "inner"),
+        ({"more": []}, ".more = []", "an object with inner"),
+        ({"each": {"b": []}}, ".each.'b' = []", "a list of at least 1"),
+        ({"each": {"b": [1, None]}}, ".each.'b'[1] = None", "a number"),
+        ({"each": [1]}, ".each = [1]", "an object"),
+        ({"word": "x" * 90_000 + "\n"}, "", ""),
+    ],
+)
 def test_what_does_not_fit_is_named_with_its_place_and_what_is_allowed(change, place, allowed):
     said = fault({**GOOD, **change}, SCHEMA, "here")
     assert said.startswith(f"here{place}" if place else "")

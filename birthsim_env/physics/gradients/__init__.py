@@ -1,1 +1,0 @@
-"""Derivatives of kernels: their source is traced to a graph, differentiated there and written as loops over lanes."""

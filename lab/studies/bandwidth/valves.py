@@ -1,0 +1,89 @@
+"""What exact rendering of a declared impedance under a multisine hand would ask of a rig's valves.
+
+Inverse dynamics of the true rig along the declared motion, with its friction (LuGre), pressures at the pneumatic stiffness
+asked for and air as (6)-(10) have it, give the active flow that each cylinder needs at every instant:
+    L = J^T (m a - m g - Fu) + friction,    qA = (dL/dt + K v) l/(2 k r T)
+Of all pressurisation flows the one is taken that needs the smallest opening u of both valves. Spools follow with the lag tau,
+so the command is u + tau du/dt, and it is possible where that stays within 1. The temperature of the air is left out. A
+controller that is allowed an error may get further.
+"""
+
+import numpy as np
+
+from baselines.estimation import reference_friction
+from baselines.impedance import Complex, Impedance
+from baselines.valve_inverse import CLEARANCE, air_at, driving_flows, stiffness_of
+from birthsim_env.loop.signals import Reference
+from birthsim_env.physics import control_model
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
+from birthsim_env.physics.geometry import inverse_geometry, jacobian, joint_force
+from birthsim_env.physics.rig.parameters import Parameters
+
+STEP, SETTLED = 1e-3, 2.0
+"""s: of the inverse dynamics, and after which the bristles have forgotten how they began."""
+
+
+@kernel
+def _commanded(load: Array, position: Array, speed: Array, stiffness: Array, p: Rig, largest: Array) -> None:
+    """Writes the largest opening that a motion commands, 1 at a valve's limit: ``largest`` (2, N) from the load on the pistons
+    besides friction, N, positions, m, and speeds, m/s, (2, N, T), at the pneumatic stiffness (2, N), N/m."""
+    for k in range(2):
+        fc, fs, fv, half = (p.fc1, p.fs1, p.fv1, p.half_l1) if k == 0 else (p.fc2, p.fs2, p.fv2, p.half_l2)
+        ap, an = (p.area_p1, p.area_n1) if k == 0 else (p.area_p2, p.area_n2)
+        for i in range(load.shape[1]):
+            z, before, opening, most = 0.0, 0.0, 0.0, 0.0
+            for t in range(load.shape[2]):
+                y, v = position[k, i, t], speed[k, i, t]
+                z = reference_friction.bristle(z, v, fc, fs, p, STEP)
+                force = load[k, i, t] + p.s0 * z + fv * v
+                rate, before = (force - before) / STEP, force
+                if t * STEP < SETTLED:
+                    continue
+                # As in ``equilibrium.balance``: both pressures for a force and a stiffness, between atmosphere and supply.
+                length_p, length_n = max(half + y, CLEARANCE), max(half - y, CLEARANCE)
+                force += p.atmosphere * (ap - an)
+                a = (stiffness[k, i] / p.index + force / length_n) / (1.0 / length_p + 1.0 / length_n)
+                a = min(p.supply * ap, p.supply * an + force, max(p.atmosphere * ap, p.atmosphere * an + force, a))
+                air = air_at(k, a / ap, (a - force) / an, y, v, p)
+                stroke = length_p + length_n
+                active = control_model.active_flow_for(rate, stiffness_of(air, p), v, stroke, p.index, p.gas * p.temperature)
+                fill_p, drain_p = driving_flows(air.pp, p)
+                fill_n, drain_n = driving_flows(air.pn, p)
+                driven = fill_p / length_p + drain_n / length_n if active > 0.0 else drain_p / length_p + fill_n / length_n
+                last, opening = opening, active / max(0.5 * p.conductance * stroke * driven, 1e-12)
+                if t * STEP > SETTLED + STEP:
+                    most = max(most, abs(opening + p.tau * (opening - last) / STEP))
+            largest[k, i] = most
+
+
+def commanded_openings(
+    rig: Parameters,
+    reference: Reference,
+    declared: Impedance,
+    direction: Array,
+    frequency: Array,
+    force: Complex,
+    period: float,
+) -> Array:
+    """The largest opening that exact rendering of the lines up to each one commands of any valve, (F, N); 1 is a valve's limit.
+
+    ``rig`` renders the impedance ``declared`` at a resting ``reference`` over N lanes. The hand pushes along unit vectors
+    ``direction`` (2, N) with the lines ``force`` (F, N), N, of ``frequency`` (F,), Hz, which repeat after ``period``, s. Lines
+    beyond are taken to move nothing.
+    """
+    turns = np.exp(2j * np.pi * frequency[:, None] * np.arange(0.0, period, STEP))
+    compliance = np.linalg.inv(declared.at(frequency).transpose(0, 3, 1, 2))
+    summed, largest = np.zeros((4, *direction.shape, turns.shape[1])), np.empty((len(frequency), *direction.shape))
+    mechanics, stiffness = rig.mechanics, np.ascontiguousarray(reference.pneumatic_stiffness)
+    weight = np.array([0.0, -mechanics.mass * mechanics.gravity])[:, None, None]
+    for line, turn in enumerate(turns):
+        offset, jw = np.einsum("nij,jn,n->in", compliance[line], direction, force[line]), 2j * np.pi * frequency[line]
+        for k, size in enumerate((direction * force[line], offset, jw * offset, jw * jw * offset)):
+            summed[k] += (size[..., None] * turn).real
+        pushed, place, velocity, acceleration = summed
+        piston = inverse_geometry(reference.position[..., None] + place, rig)
+        speed = np.einsum("ntji,int->jnt", np.linalg.inv(jacobian(piston, rig).transpose(2, 3, 0, 1)), velocity)
+        load = joint_force(mechanics.mass * acceleration - weight - pushed, piston, rig)
+        _commanded(load, piston, np.ascontiguousarray(speed), stiffness, Rig(parameter_column(rig)), largest[line])
+    return np.asarray(largest.max(axis=1))

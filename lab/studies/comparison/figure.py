@@ -1,0 +1,121 @@
+"""Figures of the bench: error in every environment, and what it costs in air."""
+
+import re
+from collections import Counter
+from pathlib import Path
+from textwrap import fill
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from baselines.figures.style import COLUMN, DARK, MIDDLE, PAGE, STYLE, headline, label_of, legend_below, log_ticks, look, save
+from lab.studies.comparison.grid import known
+from lab.studies.comparison.tables import CIRCLE, Figures, controllers_of
+
+CONDITIONS = {
+    ("ideal", "nominal"): {"marker": "o", "color": DARK, "mfc": DARK},
+    ("ideal", "randomised"): {"marker": "o", "color": DARK, "mfc": "white"},
+    ("lab", "nominal"): {"marker": "^", "color": MIDDLE, "mfc": MIDDLE},
+    ("lab", "randomised"): {"marker": "^", "color": MIDDLE, "mfc": "white"},
+    ("honest", "nominal"): {"marker": "s", "color": MIDDLE, "mfc": MIDDLE},
+    ("honest", "randomised"): {"marker": "s", "color": MIDDLE, "mfc": "white"},
+    ("honest", "drawn-sensors"): {"marker": "D", "color": DARK, "mfc": "white"},
+    ("honest", "described-sensors"): {"marker": "D", "color": MIDDLE, "mfc": MIDDLE},
+}
+"""Sensors and plant -> how they look."""
+
+
+def draw_comparison(figures: Figures, folder: Path) -> list[Path]:
+    """Both figures; returns the files written."""
+    figures = [cell for cell in figures if not cell.get("hand")]
+    if not figures:
+        return []
+    with plt.rc_context(STYLE):
+        return [*settled_figure(figures, folder), *air_figure(figures, folder)]
+
+
+def settled_figure(figures: Figures, folder: Path) -> list[Path]:
+    """Settled RMS error, median with its interval: a panel per environment, a row per controller."""
+    names = controllers_of(figures)
+    environments = list(dict.fromkeys(cell["environment"] for cell in figures))
+    present = [key for key in CONDITIONS if any((cell["sensors"], cell["plant"]) == key for cell in figures)]
+    size = PAGE, 1.2 + 0.3 * len(names) + 0.12 * len(present)
+    figure, panels = plt.subplots(1, len(environments), figsize=size, layout="constrained", sharey=True, squeeze=False)
+    first = [key for key in present if key[1] != "nominal"] or present
+    least = dict[str, tuple[float, str]]()
+    for axes, environment in zip(panels[0], environments, strict=True):
+        here = [cell for cell in figures if cell["environment"] == environment]
+        low, high = _limits(here, "settled_rms")
+        for cell in here:
+            key = cell["sensors"], cell["plant"]
+            style, found = CONDITIONS[key], cell["metrics"]["settled_rms"]
+            row = names.index(cell["controller"]) + 0.7 * ((present.index(key) + 0.5) / len(present) - 0.5)
+            if np.isfinite(found["median"]):
+                axes.hlines(row, found["low"], min(found["high"], high), color=style["color"], lw=0.9)
+                axes.plot(found["median"], row, ls="", ms=3.5, **style, label=known(*key))
+                if key == first[0]:
+                    least[environment] = min(least.get(environment, (np.inf, "")), (found["median"], cell["controller"]))
+            elif np.isinf(found["median"]):
+                axes.text(high / 1.05, row, "lost", ha="right", va="center", fontsize=7, color=style["color"])
+        axes.set(xscale="log", xlim=(low, high), title=re.sub(r"^BirthSIM/|-v\d+$", "", environment))
+        axes.set_xlabel("error (mm)")
+        log_ticks(axes.xaxis, 1.0)
+        axes.grid(axis="y", visible=False)
+        for row in range(1, len(names)):
+            axes.axhline(row - 0.5, color="black", alpha=0.15, lw=0.6)
+    panels[0, 0].set_yticks(range(len(names)), [label_of(name) for name in names])
+    panels[0, 0].set_ylim(len(names) - 0.5, -0.5)
+    wins = Counter(name for _, name in least.values()).most_common(1)
+    if wins:
+        name, times = wins[0]
+        headline(
+            figure,
+            f"{label_of(name)} has the least settled error in {times} of {len(environments)} environments: {known(*first[0])}",
+        )
+    legend_below(figure, said="RMS settled error: medians with 95 % intervals")
+    return save(figure, folder, "settled_error")
+
+
+def _limits(figures: Figures, metric: str) -> tuple[float, float]:
+    """Ends of a logarithmic axis that holds every finite figure."""
+    said = [v for cell in figures for k in ("low", "median", "high") if np.isfinite(v := cell["metrics"][metric][k])]
+    return (min(said) / 1.5, max(said) * 1.5) if said else (0.1, 10.0)
+
+
+def air_figure(figures: Figures, folder: Path) -> list[Path]:
+    """Air used against settled error, a marker per controller, on the nominal plant: medians with their intervals."""
+    environments = [cell["environment"] for cell in figures]
+    environment = CIRCLE if CIRCLE in environments else environments[0]
+    plants = [cell["plant"] for cell in figures]
+    plant = "nominal" if "nominal" in plants else plants[0]
+    here = [cell for cell in figures if (cell["environment"], cell["plant"]) == (environment, plant)]
+    names = controllers_of(figures)
+    sensors = list(dict.fromkeys(cell["sensors"] for cell in here))
+    figure, panels = plt.subplots(
+        1, len(sensors), figsize=(COLUMN if len(sensors) < 3 else PAGE, 4.0), layout="constrained", sharey=True, squeeze=False
+    )
+    top = _limits(here, "air")[1]
+    for axes, kind in zip(panels[0], sensors, strict=True):
+        shown = [cell for cell in here if cell["sensors"] == kind]
+        left, right = _limits(shown, "settled_rms")
+        for cell in shown:
+            error, air = cell["metrics"]["settled_rms"], cell["metrics"]["air"]
+            style = look(names.index(cell["controller"]))
+            if np.isfinite([error["median"], air["median"]]).all():
+                axes.hlines(air["median"], error["low"], min(error["high"], right), color=style["color"], lw=0.9)
+                axes.vlines(error["median"], air["low"], min(air["high"], top), color=style["color"], lw=0.9)
+                axes.plot(error["median"], air["median"], **style | {"linestyle": ""}, ms=5, label=label_of(cell["controller"]))
+        lost = [cell["controller"] for cell in shown if np.isinf(cell["metrics"]["settled_rms"]["median"])]
+        title = f"{kind} sensors" + (
+            fill(f"; not shown, for they lose episodes: {', '.join(map(label_of, lost))}", 34) if lost else ""
+        )
+        axes.set(xscale="log", xlim=(left, right), ylim=(0, top), xlabel="settled error (mm)")
+        axes.set_title(title)
+        log_ticks(axes.xaxis, 1.0)
+    panels[0, 0].set_ylabel("air used (normal l/min)")
+    short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
+    lowest = min(here, key=lambda cell: cell["metrics"]["settled_rms"]["median"])
+    error, air = (lowest["metrics"][kind]["median"] for kind in ("settled_rms", "air"))
+    headline(figure, f"Least error: {label_of(lowest['controller'])}, {error:.2g} mm with {air:.2g} l/min")
+    legend_below(figure, said=f"{short}, {plant.replace('drawn-sensors', 'nominal')} rig: medians with 95 % intervals")
+    return save(figure, folder, "air_against_error")

@@ -1,0 +1,82 @@
+"""The table of README: what each controller is told, and its settled error on the circle with every kind of sensors."""
+
+import numpy as np
+
+from agents.policy.files import load_policy
+from agents.policy.seeds import policy_folders
+from baselines.about import uses_force
+from baselines.bench.statistics import number
+from baselines.registry import resolved
+from lab.studies.comparison.grid import LEARNED, Conditions
+from lab.studies.comparison.tables import Figures, controllers_of
+from lab.studies.comparison.told import TOLD
+from lab.studies.tables import markdown
+
+COLUMNS = {
+    ("ideal", "nominal"): "ideal, nominal rig",
+    ("ideal", "randomised"): "ideal",
+    ("lab", "randomised"): "lab",
+    ("honest", "described-sensors"): "honest",
+}
+"""Sensors and plant -> the column of their settled errors."""
+
+CONTROLLERS = (
+    "backstepping", f"{TOLD}backstepping", f"{TOLD}backstepping-weight", f"{TOLD}backstepping-frozen",
+    "admittance-sensorless", f"{TOLD}admittance-sensorless",
+    "pid", "admittance-backstepping", "admittance-adaptive", f"{TOLD}admittance-adaptive",
+    *(f"{LEARNED}{name}" for name in ("circle", "circle_apg", "circle_lab", "circle_lab_apg", "circle_honest_apg")),
+    f"{LEARNED}circle_honest_student",
+)  # fmt: skip
+"""The paper's control law as published, told its rig, with its weight compensated, and frozen at rest; its successors without
+and with a force sensor; policies."""
+
+
+def is_shown(name: str, where: Conditions) -> bool:
+    """Whether a controller is measured under some conditions: a policy with the sensors that it was trained for."""
+    if where.hand or (where.sensors, where.plant) not in COLUMNS:
+        return False
+    return not name.startswith(LEARNED) or where.sensors == trained_with(name.removeprefix(LEARNED))
+
+
+def trained_with(policy: str) -> str:
+    """The sensor model with which a policy was trained; "" where it does not say."""
+    return str(load_policy(policy_folders(policy)[0]).training.get("sensors", ""))
+
+
+def learns_mass(name: str) -> bool:
+    """Whether a controller, as it runs, learns that the rig is lighter than believed; with sampled positions alone."""
+    if name.startswith(LEARNED):
+        name = load_policy(policy_folders(name.removeprefix(LEARNED))[0]).settings.law
+    plain, options = resolved(name.removeprefix(TOLD))
+    return plain == "admittance" and options.get("learn", True) and options.get("force_sensor", True)
+
+
+def headline(figures: Figures) -> str:
+    """A row per controller, with medians and their intervals; in bold the best of those that are told and sense the same."""
+    found = {(cell["controller"], cell["sensors"], cell["plant"]): cell for cell in figures}
+    rows = [["controller", "rig", "mass learned", "force sensed", *COLUMNS.values(), "lost or refused"]]
+    for name in controllers_of(figures):
+        own = [found.get((name, *kind)) for kind in COLUMNS]
+        errors = ["-" if cell is None else _short(cell["metrics"]["settled_rms"]) for cell in own]
+        lost = sum(cell["lost"] for cell in own if cell), sum(cell["episodes"] for cell in own if cell)
+        bare = name.removeprefix(TOLD)
+        facts = ["told" if name.startswith(TOLD) else "default", *map(_yes, (learns_mass(name), uses_force(bare)))]
+        rows.append(
+            [
+                f"`{bare.removeprefix(LEARNED)}`" + ", policy" * name.startswith(LEARNED),
+                *facts,
+                *errors,
+                "{} of {}".format(*lost),
+            ]
+        )
+    return markdown(rows, [*COLUMNS.values()], alike=[(row[1], row[3]) for row in rows[1:]])
+
+
+def _short(found: dict[str, float]) -> str:
+    """A median with its interval, whose ends have two digits, so that four of them stand side by side."""
+    low, high = ("lost" if np.isinf(found[end]) else f"{found[end]:.2g}" for end in ("low", "high"))
+    return f"{number(found['median'])} [{low}, {high}]"
+
+
+def _yes(fact: bool) -> str:
+    return "yes" if fact else "no"

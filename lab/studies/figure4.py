@@ -1,0 +1,39 @@
+"""The figures of the paper's Fig. 4, whose picture ``birthsim figure4`` draws."""
+
+from typing import Any
+
+from baselines.commands.figure4 import figures_of, record_run
+from baselines.work.tasks import Result, Task
+from birthsim_env.physics.rig.parameters import Parameters
+from lab.studies.results import Content
+from lab.studies.study import Options, Study
+from lab.studies.tables import markdown
+
+
+def measure(controller: str) -> Result:
+    """``figures_of`` the experiment with ideal sensors."""
+    return figures_of(record_run(controller), Parameters())
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    return {name: Task(name, measure, {"controller": name}) for name in options.controller}
+
+
+def _shown(content: Content) -> dict[str, str]:
+    rows = [["controller", "figure", "x or 1", "y or 2"]]
+    for controller, figures in content["figures"].items():
+        for name, values in figures.items():
+            if isinstance(values, list):
+                rows.append([f"`{controller}`", f"`{name}`", *(f"{value:.3f}" for value in values)])
+    return {"figure4.md": markdown(rows) + "\n"}
+
+
+STUDY = Study(
+    (__name__,),
+    {"controller": ("backstepping",)},
+    _tasks,
+    lambda _, found: dict(found),
+    {},
+    _shown,
+    words={"controller": "registered names"},
+)

@@ -1,0 +1,60 @@
+"""How well gradients through closed loops agree with differences: all scenarios, and every controller under all sensors."""
+
+from typing import Any
+
+import numpy as np
+
+import agents  # noqa: F401  registers the residual environments
+from baselines.bench.statistics import quantile
+from baselines.registry import LIMITED
+from baselines.work.tasks import Result, Task
+from birthsim_env.parts.sensors.sensors import SENSORS
+from lab.studies.comparison.grid import default_controllers
+from lab.studies.gradients.loops import begun, compared
+from lab.studies.results import Content
+from lab.studies.study import Found, Options, Study
+from lab.studies.tables import markdown
+
+CIRCLE = "BirthSIM/Circle-v1"
+SCENARIOS = (CIRCLE, *(f"BirthSIM/{name}" for name in ("Probe-v2", "Descent-v1", "Forceps-v1", "Dystocia-v1", "Vacuum-v0")))
+
+CONTROLLERS = (*default_controllers(), f"{LIMITED}pid", f"{LIMITED}admittance-adaptive")
+
+NEAR = 1e-6
+"""Relative error up to which a gradient agrees with a difference."""
+
+
+def agreement(lanes: int, steps: int, begins: int, **arguments: Any) -> Result:
+    """Of gradients over ``steps`` policy steps, ``begins`` after episodes began: median error, and shares of the lanes that
+    agree with the middle difference, and with one of the three."""
+    off, equal = compared(begun(lanes=lanes, steps=begins, **arguments), steps)
+    least = off.min(axis=0)
+    shares = {"middle": float(np.mean(off[1] < NEAR)), "any": float(np.mean(least < NEAR))}
+    return {"equal": equal, "lanes": off.shape[1], "median": quantile(least, 0.5), **shares, "worst": float(least.max())}
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    loops = {name: {"world": name, "lanes": options.states, "steps": 1, "begins": 300} for name in SCENARIOS}
+    loops["a hand that feels"] = {**loops[CIRCLE], "user_force": "guided"}
+    for name in CONTROLLERS:
+        for sensors in SENSORS:
+            loop = {"world": CIRCLE, "controller": name, "sensors": sensors, "lanes": options.lanes, "steps": 4, "begins": 20}
+            loops[f"{name}, {sensors}"] = loop
+    return {name: Task(f"agreement{k}", agreement, loop) for k, (name, loop) in enumerate(loops.items())}
+
+
+def _kept(options: Options, found: Found) -> Any:
+    return {name: dict(result) for name, result in found.items()}
+
+
+def _shown(content: Content) -> dict[str, str]:
+    rows = [["", "lanes", "median error", "within 1e-6 of one difference", "of one of three", "largest error", "bits equal"]]
+    for name, one in content["figures"].items():
+        shares = (f"{100 * one[share]:.1f} %" for share in ("middle", "any"))
+        ends = f"{one['worst']:.0e}", "yes" if one["equal"] else "NO"
+        rows.append([name.removeprefix("BirthSIM/"), f"{one['lanes']}", f"{one['median']:.0e}", *shares, *ends])
+    return {"gradients_checks.md": markdown(rows) + "\n"}
+
+
+UNITS = {"equal": "1", "lanes": "1", "median": "1", "middle": "1", "any": "1", "worst": "1"}
+STUDY = Study((__name__, "agents.residual.env"), {"states": 1000, "lanes": 256}, _tasks, _kept, UNITS, _shown)

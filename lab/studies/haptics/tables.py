@@ -1,0 +1,181 @@
+"""What a hand feels, in Markdown: a table for each subject, a row for each law under each kind of sensors."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.statistics import number, quantile
+from birthsim_env.physics.compiled.lanes import Array
+from lab.studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
+from lab.studies.haptics.kept import PEAK
+from lab.studies.haptics.release import PULL, STIFFNESS
+from lab.studies.tables import markdown
+
+Runs = Sequence[dict[str, Any]]
+"""What ``lab.studies.haptics.kept.kept`` gives, in the order of the rows."""
+
+
+def report(runs: Runs) -> str:
+    """All tables for the subjects that were measured."""
+    parts = [rendering_table(runs), release_table(runs), backdriving_table(runs), stability_table(runs)]
+    return "\n\n".join([heading(runs), *(part for part in parts if part)]) + "\n"
+
+
+def heading(runs: Runs) -> str:
+    """Which rigs and seeds."""
+    first = runs[0]
+    randomised = f"{first['rigs']} randomised rigs, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
+    rigs = randomised if first["rigs"] else "the rig as the controllers believe it"
+    return f"{rigs[0].upper()}{rigs[1:]}. Two figures in a cell are the median and the worst over poses, directions and rigs."
+
+
+def rendering_table(runs: Runs) -> str:
+    """Impedance, errors, energy, air and saturation at ``PEAK``; medians over lanes, with the worst behind a semicolon."""
+    rows = []
+    for run in runs:
+        for piece in run.get("impedance", ()):
+            kept = np.array(piece["peak"]) == PEAK
+            lost = np.array(piece["lost"], dtype=bool)[kept]
+            rows.append(
+                [
+                    *_who(run),
+                    f"{piece['stiffness']:g}",
+                    *(
+                        _pair(piece, name, kept, lost, least=True)
+                        for name in ("bandwidth", "unnoticed", "unnoticed_without_work")
+                    ),
+                    *(_pair(piece, name, kept, lost) for name in UNDER_MULTISINES),
+                    str(int(lost.sum())),
+                ]
+            )
+    columns = (
+        *WHO, "N/m", "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
+        "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %", "lost",
+    )  # fmt: skip
+    return _table(f"### Impedance under multisines of {PEAK:g} N", columns, rows, columns[7:-1], columns[4:7])
+
+
+def release_table(runs: Runs) -> str:
+    """Overshoot, speed and energy of a pull that is let go, beside the declared impedance's."""
+    rows = []
+    for run in runs:
+        for piece in run.get("release", ()):
+            lost = np.array(piece["lost"], dtype=bool)
+            own = {
+                name: _spread(np.where(lost, np.inf, _numbers(piece[name]))) for name in ("overshoot_mm", "speed", "kinetic")
+            }
+            ideal = piece["ideal"] or {}
+            wanted = {name: _spread(_numbers(ideal[name])) if ideal else "-" for name in ("overshoot_mm", "speed")}
+            energy = _spread(np.where(lost, np.inf, _numbers(piece["energy"])))
+            rows.append(
+                [
+                    *_who(run),
+                    own["overshoot_mm"],
+                    wanted["overshoot_mm"],
+                    own["speed"],
+                    wanted["speed"],
+                    own["kinetic"],
+                    number(piece["stored"]),
+                    energy,
+                    str(int(lost.sum())),
+                ]
+            )
+    columns = (
+        *WHO, "overshoot, mm", "of the declared impedance", "peak speed, m/s", "of the declared impedance",
+        "kinetic energy, J", "stored by the spring, J", "energy given, J", "lost",
+    )  # fmt: skip
+    return _table(f"### A pull of {PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m", columns, rows, LEAST)
+
+
+def backdriving_table(runs: Runs) -> str:
+    """Mean and largest force beyond ``K x``, over poses and directions, at each setpoint."""
+    stiffnesses = list(dict.fromkeys(piece["stiffness"] for run in runs for piece in run.get("backdriving", ())))
+    rows = []
+    for run in runs:
+        found = {piece["stiffness"]: piece for piece in run.get("backdriving", ())}
+        if found:
+            rows.append([*_who(run), *(_beyond(found[stiffness]) for stiffness in stiffnesses)])
+    columns = (*WHO, *(f"at {value:g} N/m" for value in stiffnesses))
+    return _table("### Force beyond K x at 10 mm/s, N (median of the means; largest)", columns, rows, columns[3:])
+
+
+def stability_table(runs: Runs) -> str:
+    """Hands with which the law rests, the largest of motion, force (peak to peak) and energy, and the stiffest setpoint that is
+    stable against all of ``HANDS``."""
+    rows = []
+    for run in runs:
+        if not ("hands" in run or "z_width" in run):
+            continue
+        cells = []
+        for piece in run.get("hands", ()):
+            cells.append(f"{100 * np.array(piece['stable'], dtype=bool).mean():.0f} %")
+            for name in ("motion_mm", "force", "energy"):
+                values = _numbers(piece[name])
+                cells.append(number(float(np.where(np.isfinite(values), values, np.inf).max())))
+        for piece in run.get("z_width", ()):
+            cells += list(_z_width(piece))
+        rows.append([*_who(run), *cells])
+    held = next((run["hands"] for run in runs if "hands" in run), ())
+    columns = [*WHO]
+    for piece in held:
+        columns += [f"hands of {piece['damping']:g} N s/m: stable", "motion, mm", "force, N", "energy given, J"]
+    if any("z_width" in run for run in runs):
+        columns += ["stable up to, N/m", "with the best damping, N/m"]
+    title = f"### Held by hands of 0 to 20 kN/m and 0 to 2 kg at {SETPOINT:g} N/m, and Z-width against {len(HANDS)} of them"
+    best = [name for name in columns if "stable" in name or "damping" in name]
+    return _table(title, columns, rows, ("motion, mm", "force, N", "energy given, J"), best)
+
+
+UNDER_MULTISINES = ("noticed", "error_own_mm", "error_spring_mm", "energy", "shortage", "air", "saturation")
+"""Figures of a lane that the table of impedances has with their worst."""
+
+LEAST = ("overshoot, mm", "peak speed, m/s", "kinetic energy, J", "energy given, J")
+"""Of a release."""
+
+WHO = ("controller", "sensors", "uses the hand's force")
+
+
+def _who(run: dict[str, Any]) -> list[str]:
+    return [run["controller"], run["sensors"], "yes" if run["uses_force"] else "no"]
+
+
+def _numbers(values: Any) -> Array:
+    """JSON's null is NaN."""
+    return np.array(values, dtype=np.float64)
+
+
+def _spread(values: Array, least: bool = False) -> str:
+    """Median; the worst, which is the largest or the ``least``."""
+    if not np.isfinite(values).any():
+        return "lost" if np.isinf(values).any() else "-"
+    return f"{number(quantile(values, 0.5))}; {number(quantile(values, 0.0 if least else 1.0))}"
+
+
+def _pair(piece: dict[str, Any], name: str, kept: Array, lost: Array, least: bool = False) -> str:
+    if name not in piece:
+        return "-"
+    return _spread(np.where(lost, 0.0 if least else np.inf, _numbers(piece[name])[kept]), least)
+
+
+def _beyond(piece: dict[str, Any]) -> str:
+    if piece["refused"] is not None:
+        return "refused"
+    lost = np.array(piece["lost"], dtype=bool)
+    mean, most = (np.where(lost, np.inf, _numbers(piece[name])) for name in ("mean", "most"))
+    return f"{number(quantile(mean, 0.5))}; {number(quantile(most, 1.0))}"
+
+
+def _z_width(piece: dict[str, Any]) -> tuple[str, str]:
+    """The stiffest stable setpoint with damping as it is, and with the best."""
+    limits = stable_up_to(piece)
+    own, best = (f"{limit:g}" if limit else "none" for limit in (limits[0], max(limits)))
+    return own, best
+
+
+def _table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], least: Sequence[str], most: Sequence[str] = ()
+) -> str:
+    """Of the same sensors and told the same; impedances of the same setpoint, which is the fourth column there."""
+    told = 4 if "N/m" in columns else 3
+    return f"{title}\n\n{markdown([columns, *rows], least, most, [row[1:told] for row in map(tuple, rows)])}" if rows else ""

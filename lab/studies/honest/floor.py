@@ -1,0 +1,49 @@
+"""What the errors of honest sensors leave to the best controller on randomised rigs."""
+
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.statistics import number, quantile
+from baselines.work.tasks import Result, Task
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from lab.studies.comparison.grid import as_described
+from lab.studies.honest.sensor_floor import probe_floor
+from lab.studies.results import Content
+from lab.studies.study import Options, Study
+from lab.studies.tables import markdown
+
+UNITS = {"stiffness_error": "%", "held_error": "mm"}
+FRACTIONS = {"median": 0.5, "q95": 0.95, "worst": 1.0}
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    believed = load_parameters(options.parameters or None)
+    rigs = {"honest": as_described(believed), "honest, drawn": believed}
+    own = {"episodes": options.episodes, "seed": options.seed}
+    return {kind: Task(kind.replace(", ", "-"), floor, {"rig": rig.to_dict(), **own}) for kind, rig in rigs.items()}
+
+
+def floor(rig: dict[str, Any], episodes: int, seed: int) -> Result:
+    """Of ``probe_floor`` each metric's sizes: median, 95 % and worst."""
+    sizes = {name: np.abs(values) for name, values in probe_floor(Parameters.from_dict(rig), episodes, seed).items()}
+    return {name: {key: quantile(sizes[name], fraction) for key, fraction in FRACTIONS.items()} for name in UNITS}
+
+
+def _shown(content: Content) -> dict[str, str]:
+    rows = [["sensors", "stiffness error, %: median, 95th percentile, worst", "error while held, mm"]]
+    for kind, found in content["figures"].items():
+        rows.append(
+            [kind.replace("drawn", "randomised"), *(", ".join(number(found[name][key]) for key in FRACTIONS) for name in UNITS)]
+        )
+    return {"floor.md": markdown(rows) + "\n"}
+
+
+STUDY = Study(
+    ("lab.studies.honest.sensor_floor",),
+    {"episodes": 128, "seed": 70000, "parameters": ""},
+    _tasks,
+    lambda _, found: dict(found),
+    UNITS,
+    _shown,
+)

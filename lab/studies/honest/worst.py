@@ -1,0 +1,203 @@
+"""The worst of many drawn worlds, the worst that a search finds, and which of its figures makes it so."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from baselines.bench.evaluation import Evaluation, evaluate_worlds
+from baselines.bench.metrics import UNITS
+from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
+from baselines.identification.quantities import value_of
+from baselines.registry import make_controller
+from baselines.work.tasks import Result, Task
+from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.hands.user_forces import Ramp
+from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
+from birthsim_env.physics.rig.values import checked_number
+from lab.studies.comparison.grid import as_described
+from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
+from lab.studies.results import Content
+from lab.studies.study import Options, Study
+from lab.studies.tables import markdown, uses_force
+
+ENVIRONMENT = environment_id("probe")
+PUSHED = SCENARIOS["probe"].duration - PROBE_REST
+"""s of ``ENVIRONMENT`` from the beginning of its push to its end."""
+LONGEST_REST = 60.0
+"""s; assumed: no rig needs longer to come to rest."""
+NAMED, CAUSES = 5, 8
+"""Worst drawn worlds that a row names; changes of one figure that are shown, of those that help most."""
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    checked_number("--rest", options.rest, "s", least=0.0, most=LONGEST_REST)
+    believed = load_parameters(options.parameters or None)
+    rig = (believed if options.drawn else as_described(believed)).to_dict()
+    own = {name: getattr(options, name) for name in ("metric", "limit", "rest", "episodes", "seed")}
+    pairs = [(name, sensors) for name in options.controller for sensors in options.sensors]
+    for name in options.controller:
+        make_controller(name, believed)
+    return {pair: Task("-".join(pair), worst, {"controller": pair[0], "sensors": pair[1], "rig": rig, **own}) for pair in pairs}
+
+
+def worst(
+    controller: str, sensors: str, rig: dict[str, Any], metric: str, limit: float, rest: float, episodes: int, seed: int
+) -> Result:
+    """Median, 95 % and worst of a metric's sizes and of unrest, the worst worlds, and the worst that a search then finds among
+    those that the rig's strength can bear, with its causes."""
+    own = Parameters.from_dict(rig)
+    seeds = seed + np.arange(episodes, dtype=np.int64)
+    ranges = {name: pair for name, pair in documented_ranges(own, sensors).items() if name not in drawn_by(sensors)}
+
+    def run(seeds: Seeds, places: Array) -> Evaluation:
+        return _evaluated(controller, rest, own, sensors, seeds, rigs_at(places, ranges, own))
+
+    places = drawn_places(seeds, ranges)
+    done = run(seeds, places)
+    sizes, signed = sizes_of(done, metric), penalize_lost(done.metrics[metric], done.lost, applies=True)
+    order = np.argsort(-sizes, kind="stable")
+    begun = seeds, places, _bearable(done, metric)
+    found, where = hardest(lambda *world: _bearable(run(*world), metric), *begun, episodes, seed)
+    figures = {name: float(value) for name, value in figures_at(where, ranges).items()}
+    return {
+        "controller": controller, "sensors": sensors,
+        **{name: jsonable([quantile(sizes_of(done, name), part) for part in (0.5, 0.95, 1.0)]) for name in (metric, "unrest")},
+        "above": int((sizes > limit).sum()), "lost": int(sum(done.lost)),
+        "named": jsonable([[done.seeds[k], float(signed[k])] for k in order[:NAMED]]),
+        "found": causes(controller, sensors, own, metric, rest, found, figures),
+    }  # fmt: skip
+
+
+def _bearable(evaluation: Evaluation, metric: str) -> Array:
+    """Sizes of a metric, less than nothing in worlds that ask for more than the rig's strength."""
+    bearable = np.array(evaluation.required_strength_ratio) <= 1.0
+    return np.where(bearable, np.nan_to_num(sizes_of(evaluation, metric), nan=-1.0, posinf=np.inf), -1.0)
+
+
+def causes(
+    controller: str, sensors: str, rig: Parameters, metric: str, rest: float, seed: int, figures: dict[str, float]
+) -> dict[str, Any]:
+    """The metric in world ``seed`` with a rig of these ``figures``, and where one figure is as the controller believes, or one
+    error of the sensors is 0."""
+    own = {figure: [low, high] for figure, low, high in rig.ranges}
+
+    def placed(fixed: dict[str, float]) -> Parameters:
+        every = {**own, **{name: [value, value] for name, value in {**figures, **fixed}.items()}}
+        return Parameters.from_dict({**rig.to_dict(), "randomize": every})
+
+    def size(fixed: dict[str, float], seconds: float = rest) -> float:
+        return float(sizes_of(_evaluated(controller, seconds, placed(fixed), sensors, [seed]), metric)[0])
+
+    world, push, way = _world(placed({}), sensors, seed)
+    ranges = documented_ranges(rig, sensors)
+    drawn = {figure: value_of(rig, figure) for figure, (low, high) in ranges.items() if low < high}
+    errors = [figure for figure in ranges if figure in drawn_by(sensors) and field_of(figure).metadata["least"] == 0.0]
+    put = [*drawn.items(), *((figure, 0.0) for figure in errors)]
+    rows = sorted((size({figure: value}), figure, world[figure], value) for figure, value in put)[:CAUSES]
+    here = _evaluated(controller, rest, placed({}), sensors, [seed])
+    return {
+        "seed": seed, "figures": figures, "push_n": push, "way_mm": way, "strength": float(here.required_strength_ratio[0]),
+        **jsonable({
+            "size": float(sizes_of(here, metric)[0]), "as_believed": size(drawn),
+            "changes": [["s of rest", rest, 2 * rest, size({}, 2 * rest)], *([*cells, value] for value, *cells in rows)],
+        }),
+    }  # fmt: skip
+
+
+def _shown(content: Content) -> dict[str, str]:
+    settings, metric = content["settings"], content["settings"]["metric"]
+    named = f"{metric}, {UNITS[metric]}"
+    head = ["controller", "sensors"]
+    rows = [[*head, named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
+    names = list(content["figures"][0]["found"]["figures"])
+    worlds = [[*head, "found in world", "push, N", "mm asked for", "% of the strength", *names]]
+    changed = [[*head, "figure", "of the world found", "put to", named]]
+    for row in content["figures"]:
+        own, found = [row["controller"], row["sensors"]], row["found"]
+        sizes = [", ".join(map(_number, row[name])) for name in (metric, "unrest")]
+        listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in row["named"])
+        rows.append([*own, sizes[0], str(row["above"]), sizes[1], str(row["lost"]), listed, _number(found["size"])])
+        asked = (found["push_n"], found["way_mm"], 100 * found["strength"], *found["figures"].values())
+        worlds.append([*own, str(found["seed"]), *map(number, asked)])
+        changed += [[*own, figure, f"{was:.4g}", f"{put:.4g}", _number(size)] for figure, was, put, size in found["changes"]]
+        changed.append([*own, "all that are randomised", "", "as believed", _number(found["as_believed"])])
+    text = (
+        f"{settings['episodes']} worlds of {ENVIRONMENT} from seed {settings['seed']}, rigs and scenarios randomised, "
+        f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst. The last column has "
+        f"what {settings['episodes']} further episodes found by moving the rigs of the worst worlds within their ranges."
+    )
+    alike = [(row[1], uses_force(row[0])) for row in rows[1:]]
+    tables = [markdown(rows, rows[0][2:6], alike=alike), markdown(worlds), markdown(changed)]
+    return {"worst.md": "\n\n".join([text, *tables]) + "\n"}
+
+
+def _number(value: float | str) -> str:
+    return value if isinstance(value, str) else number(value)
+
+
+def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], float, float]:
+    """Figures of the rig and its sensors in world ``seed``; its push, N, and the way that it asks for, mm."""
+    env: Any = gymnasium.make_vec(ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True)
+    env.reset(seed=[seed])
+    shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "figures", {}).items()}
+    simulation = env.simulation
+    simulation.run(round((PROBE_REST + PUSHED / 2) / simulation.period))
+    force, target = simulation.force, simulation.reference.position
+    way = simulation.reference.compliant_target(force) - target
+    env.close()
+    ranges = {name: pair for name, pair in documented_ranges(rig, sensors).items() if name not in drawn_by(sensors)}
+    drawn = draw_parameters(rig, ranges, stream(seed, 0, "parameters"))
+    figures = {name: value_of(drawn, name) for name in ranges}
+    figures |= {f"electronics.{name}": value for name, value in shown.items()}
+    return figures, float(np.hypot(*force[:, 0])), float(1e3 * np.hypot(*way[:, 0]))
+
+
+def sizes_of(evaluation: Evaluation, metric: str) -> Array:
+    """The sizes of a metric per episode, infinite where the lane was lost."""
+    return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost, applies=True))
+
+
+def _evaluated(
+    name: str, rest: float, rig: Parameters, sensors: str, seeds: Sequence[int] | Seeds, rigs: Array | None = None
+) -> Evaluation:
+    """In the worlds of ``seeds``, whose ``rigs`` (PARAMETERS, N) are drawn where none are given."""
+    hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
+    setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
+    setting["randomize"] = True if rigs is None else "sensors" if drawn_by(sensors) else "scenario"
+    law, own = make_controller(name, rig), [int(seed) for seed in seeds]
+    return evaluate_worlds(ENVIRONMENT, law, name, own, rigs, progress=False, **setting)
+
+
+STUDY = Study(
+    (__name__,),
+    {
+        "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"),
+        "sensors": tuple(SENSORS),
+        "drawn": False,
+        "metric": "stiffness_error",
+        "limit": 15.0,
+        "rest": PROBE_REST,
+        "episodes": 800,
+        "seed": 90000,
+        "parameters": "",
+    },
+    _tasks,
+    lambda _, found: list(found.values()),
+    {**UNITS, "push_n": "N", "way_mm": "mm"},
+    _shown,
+    allowed={"sensors": tuple(SENSORS), "metric": tuple(UNITS)},
+    words={
+        "controller": "registered names",
+        "drawn": "randomise the figures of honest sensors too",
+        "limit": "worlds above it are counted",
+        "rest": "s before the push",
+        "seed": "of the first world",
+        "parameters": "TOML file of the rig as the controllers believe it",
+    },
+)

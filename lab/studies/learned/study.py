@@ -1,0 +1,208 @@
+"""What the shipped policies take off their controllers' errors, on worlds that no training used."""
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from agents.commands.evaluate import evaluate_learned
+from agents.policy.files import WEIGHTS
+from agents.policy.seeds import as_table, policy_folders, seed_figures
+from baselines.bench.evaluation import DATA, data, merged
+from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
+from baselines.bench.statistics import jsonable
+from baselines.work.tasks import Result, Task
+from birthsim_env.physics.compiled.sources import ROOT
+from birthsim_env.physics.rig.parameters import load_parameters
+from lab.studies.learned import felt
+from lab.studies.results import Content
+from lab.studies.study import Found, Options, Study
+from lab.studies.tables import cells, markdown, uses_force
+from lab.studies.worlds import worlds
+
+
+class Run(NamedTuple):
+    """Where the seeds of a policy run beside controllers."""
+
+    environment: str
+    episodes: int
+    seed: int
+    controllers: tuple[str, ...] = ("backstepping", "backstepping-force-first")
+    sensors: str = "ideal"
+    rig: str | None = None
+
+
+RUNS = {
+    "circle": Run("BirthSIM/Circle-v1", 256, 20000),
+    "probe": Run("BirthSIM/Probe-v2", 128, 20000),
+    "descent": Run("BirthSIM/Descent-v1", 64, 20000),
+    "forceps": Run("BirthSIM/Forceps-v1", 128, 20000),
+    "dystocia": Run("BirthSIM/Dystocia-v1", 128, 20000),
+    "circle_lab": Run("BirthSIM/Circle-v1", 256, 20000, ("admittance-backstepping",), "lab"),
+    "circle_pure": Run("BirthSIM/Circle-v1", 64, 20000, ("backstepping",)),
+    "circle_honest_student": Run(
+        "BirthSIM/Circle-v1", 128, 170000, ("admittance-sensorless", "backstepping-force-first"), "honest",
+        "examples/honest_sensors_rig.toml",
+    ),
+    **{
+        f"{name}_apg": Run(environment, episodes, 74_800_000, ("backstepping", "admittance-backstepping"))
+        for name, environment, episodes in (
+            ("circle", "BirthSIM/Circle-v1", 256), ("probe", "BirthSIM/Probe-v2", 128), ("descent", "BirthSIM/Descent-v1", 64),
+            ("forceps", "BirthSIM/Forceps-v1", 128), ("dystocia", "BirthSIM/Dystocia-v1", 128),
+            ("vacuum", "BirthSIM/Vacuum-v0", 128),
+        )
+    },
+    "circle_residual_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000),
+    "circle_lab_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000, ("admittance-backstepping", "admittance-adaptive"), "lab"),
+}  # fmt: skip
+"""Policy -> its run; seeds were never used for training or design."""
+
+COMPARED = {
+    "settled_rms": ("settled error, mm", 3),
+    "pneumatic_rms_1": ("error of pneumatic stiffness 1, %", 2), "pneumatic_rms_2": ("of 2, %", 2), "air": ("air, l/min", 2),
+}  # fmt: skip
+"""Metric -> its column beside classical controllers, and how much a cell has of median, 95th percentile and worst."""
+
+
+def _pieces(policy: str) -> dict[str, list[Task]]:
+    """Controller or seed -> its pieces, of which the last is what a hand feels."""
+    run = RUNS[policy]
+    rig = load_parameters(ROOT / run.rig if run.rig else None)
+    world, span = {"sensors": run.sensors, "randomize": True}, (run.episodes, run.seed)
+    found = {}
+    for name in run.controllers:
+        own = controller_settings(name, rig)
+        found[name] = evaluation_tasks(f"{policy}-{name}", own, run.environment, world, *span)
+        found[name].append(Task(f"felt/{file_stem(name)}-{run.sensors}", felt.measure, {**own, "sensors": run.sensors}))
+    for place in policy_folders(policy):
+        network = file_hash(str(place / WEIGHTS))
+        own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
+        found[place.name] = evaluation_tasks(f"{policy}-{place.name}", own, run.environment, world, *span, evaluate_learned)
+        found[place.name].append(Task(f"felt/{policy}-{place.name}", felt_by_learned, {**own, "sensors": run.sensors}))
+    return found
+
+
+def felt_by_learned(**settings: Any) -> Result:
+    """What a hand feels of a policy, whose code this module imports, so that it counts."""
+    return felt.measure(**settings)
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    every = [(policy, who, pieces) for policy in options.policy for who, pieces in _pieces(policy).items()]
+    return {(policy, who, k): task for policy, who, pieces in every for k, task in enumerate(pieces)}
+
+
+def _kept(options: Options, found: Found) -> Any:
+    kept = {}
+    for policy in options.policy:
+        names = dict.fromkeys(who for one, who, _ in found if one == policy)
+        pieces = {who: [result for (one, own, _), result in found.items() if (one, own) == (policy, who)] for who in names}
+        every = {who: gathered(who, own[:-1]) for who, own in pieces.items()}
+        controllers, seeds = (
+            [one for who, one in every.items() if (who in RUNS[policy].controllers) == classical] for classical in (True, False)
+        )
+        together = [*controllers, merged(seeds, f"residual, {len(seeds)} seeds")]
+        felt_of = [[pieces[one.controller][-1]] for one in controllers] + [[pieces[one.controller][-1] for one in seeds]]
+        kept[policy] = {
+            "beside": {one.controller: seed_figures(one, seeds) for one in controllers},
+            "felt": {one.controller: felt.figures_of(own) for one, own in zip(together, felt_of, strict=True)},
+            "metrics": {"columns": list(DATA), "rows": list(csv.reader(io.StringIO(data(together))))[1:]},
+        }
+    return jsonable(kept)
+
+
+def _shown(content: Content) -> dict[str, str]:
+    parts, rows = [_beside(content["figures"])], [["policy", *DATA]]
+    for policy, found in content["figures"].items():
+        run = RUNS[policy]
+        world = f"{run.environment}, {run.episodes} episodes from seed {run.seed}, {run.sensors} sensors, randomised rigs."
+        parts += [f"## {policy}", world, *map(as_table, found["beside"].values())]
+        rows += [[policy, *row] for row in found["metrics"]["rows"]]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    summary = _summary(content["figures"])
+    return {"learned.md": "\n\n".join(parts) + "\n", "learned.csv": text.getvalue(), "residual.md": summary}
+
+
+def _summary(figures: dict[str, Any]) -> str:
+    """Pooled errors of each scenario's policy beside its controllers."""
+    head = ["scenario", "paper's law, mm", "controller underneath, mm", "with the residual, mm", "less than the paper's law, %"]
+    lines = [head, ["---"] * len(head)]
+    shown = [policy for policy in ("circle", "probe", "forceps", "dystocia", "descent") if policy in figures]
+    for policy in shown:
+        own = {name: _row(found, "pooled RMS") for name, found in figures[policy]["beside"].items()}
+        paper, under = (own[name] for name in RUNS[policy].controllers)
+        less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
+        off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
+        lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
+    return f"{_worlds(shown)}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def _beside(figures: dict[str, Any]) -> str:
+    """Policies beside classical controllers."""
+    settled, *others = [name for name, _ in COMPARED.values()]
+    rows = [["world, sensors", "controller", settled, *felt.COLUMNS.values(), *others, "lost"]]
+    alike = []
+    for policy, found in figures.items():
+        every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
+        for controller in dict.fromkeys(row[2] for row in every):
+            own = {row[0]: row[1:] for row in every if row[2] == controller}
+            tracks = [cells(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()]
+            touch = [cells(found["felt"][controller][name][:2]) for name in felt.COLUMNS]
+            name = controller.replace("residual", policy) if controller.startswith("residual") else controller
+            of, _, lost, *_ = own["lost episodes"]
+            rows.append([world, name, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
+            alike.append((policy, uses_force(name)))
+    return f"{_worlds(figures)}\n\n{markdown(rows, rows[0][2:-1], alike=alike)}\n"
+
+
+def _worlds(policies: Iterable[str]) -> str:
+    """The worlds of ``policies``, in a sentence."""
+    sets = dict.fromkeys((RUNS[policy].seed, RUNS[policy].episodes) for policy in policies)
+    named = {one: [policy for policy in policies if (RUNS[policy].seed, RUNS[policy].episodes) == one] for one in sets}
+    return " ".join(f"{worlds(*one)}: {', '.join(f'`{policy}`' for policy in own)}." for one, own in named.items())
+
+
+def _by_gradients(content: Content) -> dict[str, str]:
+    return {"gradients_policies.md": _beside(content["figures"])}
+
+
+def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
+    """The row of the settled error's ``statistic``."""
+    return next(row for row in found["rows"] if row[0] == "settled_rms" and row[2] == statistic)
+
+
+def _pictures(content: Content, folder: Path) -> list[Path]:
+    # pyplot takes half a second to load.
+    from agents.reports.learning_curves import draw_learning_curves, learning_curves
+
+    return draw_learning_curves(learning_curves(policy_folders("circle")), folder)
+
+
+def _side_by_side(content: Content, folder: Path) -> list[Path]:
+    from agents.reports.learning_curves import draw_side_by_side, learning_curves
+
+    from_scratch = {"gradients": "circle_apg", "PPO": "circle_pure"}
+    curves = {algorithm: learning_curves(policy_folders(name)) for algorithm, name in from_scratch.items()}
+    return draw_side_by_side(curves, folder, "from_scratch")
+
+
+SOURCES = ("agents.policy.controller", "agents.commands.evaluate", "lab.studies.learned.study")
+UNITS = {"settled_rms": "mm", "stiffness_error": "%", "noticed": "1", "energy": "mJ", "air": "l/min", "saturation": "%"}
+GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
+WORDS = {"policy": "shipped policies, each in its own worlds"}
+
+BY_GRADIENTS = Study(
+    SOURCES,
+    {"policy": GRADIENTS},
+    _tasks,
+    _kept,
+    UNITS,
+    _by_gradients,
+    _side_by_side,
+    allowed={"policy": GRADIENTS},
+    words=WORDS,
+)
+OTHERS = tuple(name for name in RUNS if name not in GRADIENTS)
+STUDY = Study(SOURCES, {"policy": OTHERS}, _tasks, _kept, UNITS, _shown, _pictures, allowed={"policy": OTHERS}, words=WORDS)

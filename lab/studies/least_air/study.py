@@ -1,0 +1,99 @@
+"""How much air the schedule of least air saves, and what it does to the errors."""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.evaluation import evaluate
+from baselines.bench.statistics import number
+from baselines.registry import make_controller
+from baselines.work.tasks import Result, Task
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.physics.rig.parameters import Parameters
+from lab.studies.least_air.schedule import least_air
+from lab.studies.results import Content
+from lab.studies.study import Found, Options, Study
+from lab.studies.tables import markdown
+from lab.studies.worlds import worlds
+
+PUSHES = {"circle": [(30.0, 0.0), (-30.0, 0.0), (0.0, 30.0), (0.0, -30.0)], "descent": [(80.0, 0.0)]}
+"""N: the strongest pushes of the scenarios' hands."""
+
+CONTROLLERS, SENSORS = ("backstepping", "admittance-backstepping"), ("ideal", "lab")
+
+UNITS = {"air": "l/min", "saved": "%", "error": "mm"}
+
+
+def measure(scenario: str, controller: str, sensors: str, episodes: int, seed: int) -> Result:
+    """With the scenario's own pneumatic stiffness and with least air, on the same randomised rigs: the median of ``air``; the
+    median of what is ``saved``, and 5 and 95 % of the episodes; median and 95 % of the settled ``error``; ``lost`` episodes."""
+    rig = Parameters()
+    reference, _, own = SCENARIOS[scenario].nominal()
+    least = least_air(reference, own, SCENARIOS[scenario].duration, rig, PUSHES[scenario])
+    both = [
+        evaluate(
+            environment_id(scenario),
+            make_controller(controller, rig),
+            controller,
+            episodes,
+            seed,
+            False,
+            sensors=sensors,
+            randomize="plant",
+            stiffness=stiffness,
+        )
+        for stiffness in (own, least)
+    ]
+    air = [np.array(one.metrics["air"]) for one in both]
+    return {
+        "air": [float(np.median(one)) for one in air],
+        "saved": np.quantile(100 * (1 - air[1] / air[0]), (0.5, 0.05, 0.95)).tolist(),
+        "error": [np.quantile(one.metrics["settled_rms"], (0.5, 0.95)).tolist() for one in both],
+        "lost": [int(sum(one.lost)) for one in both],
+    }
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    own = {"episodes": options.episodes, "seed": options.seed}
+    return {
+        key: Task("-".join(key), measure, dict(zip(("scenario", "controller", "sensors"), key, strict=True)) | own)
+        for key in product(options.scenario, CONTROLLERS, SENSORS)
+    }
+
+
+def _kept(options: Options, found: Found) -> Any:
+    return [{"scenario": key[0], "controller": key[1], "sensors": key[2], **result} for key, result in found.items()]
+
+
+def _shown(content: Content) -> dict[str, str]:
+    rows = [[
+        "scenario", "controller", "sensors", "air, l/min", "with least air", "saved, %", "settled error, mm", "with least air",
+        "lost",
+    ]]  # fmt: skip
+    for row in content["figures"]:
+        median, low, high = row["saved"]
+        rows.append(
+            [
+                row["scenario"],
+                f"`{row['controller']}`",
+                row["sensors"],
+                *map(number, row["air"]),
+                f"{median:.1f} ({low:.1f} to {high:.1f})",
+                *(", ".join(map(number, one)) for one in row["error"]),
+                ", ".join(map(str, row["lost"])),
+            ]
+        )
+    said = worlds(content["settings"]["seed"], content["settings"]["episodes"])
+    return {"air.md": f"{said}, randomised rigs on the scenario as described.\n\n{markdown(rows)}\n"}
+
+
+STUDY = Study(
+    (__name__,),
+    {"scenario": tuple(PUSHES), "episodes": 64, "seed": 96000},
+    _tasks,
+    _kept,
+    UNITS,
+    _shown,
+    allowed={"scenario": tuple(PUSHES)},
+)

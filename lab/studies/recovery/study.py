@@ -1,0 +1,76 @@
+"""Randomised rigs, identified from logs of their own."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.statistics import quantile
+from baselines.identification.quantities import QUANTITIES, value_of
+from baselines.work.tasks import Task
+from birthsim_env.parts.drawn.randomization import Ranges
+from birthsim_env.physics.rig.parameters import Parameters, field_of
+from lab.studies.recovery.tasks import EXPERIMENTS, RANGES, recovery_tasks
+from lab.studies.results import Content
+from lab.studies.study import Found, Options, Study
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    tasks = recovery_tasks(options.rigs, options.seed, options.duration, options.experiment)
+    return {task.name: task for task in tasks}
+
+
+def _kept(options: Options, found: Found) -> Any:
+    if not found:
+        raise ValueError(f"none of {options.rigs} rigs was identified")
+    return list(found.values())
+
+
+def _shown(content: Content, name: str) -> dict[str, str]:
+    found, settings = content["figures"], content["settings"]
+    head = (
+        f"{len(found)} of {settings['rigs']} rigs, seeds from {settings['seed']}, experiment {settings['experiment']} of "
+        f"{settings['duration']:g} s, `lab` sensors."
+    )
+    worst = max(max(result["misfit"]) for result in found)
+    last = f"Largest residual over the noise of its log: {worst:.3f}."
+    return {f"{name}.md": "\n".join([head, "", *recovery_table(found), "", last]) + "\n"}
+
+
+def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> list[str]:
+    """Markdown: per parameter how many rigs' logs tell it, and of these error and interval."""
+    lines = [
+        "| parameter | randomised from | told in | error: median | 95th percentile | largest | half interval: median "
+        "| true value inside |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for one in QUANTITIES:
+        rows = [result["rows"][one.name] for result in results]
+        told = [row for row in rows if row["told"]]
+        low, high = ranges.get(one.name, 2 * [value_of(Parameters(), one.name)])
+        scale, unit, digits = (1e3, "ms", 2) if one.unit else (100.0, "%", 2)
+        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.unit else row["true"]) for row in told]
+        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.unit else row["true"]) for row in told]
+        cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
+        inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
+        written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)
+        drawn = f"{f'{low:g} to ' if low < high else ''}{high:g} {field_of(one.name).metadata['unit']}"
+        lines.append(f"| `{one.name}` | {drawn} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
+    return lines
+
+
+def _recovery(name: str, rigs: int, experiment: str) -> Study:
+    return Study(
+        ("lab.studies.recovery.tasks",),
+        {"rigs": rigs, "seed": 82000, "duration": 12.0, "experiment": experiment},
+        _tasks,
+        _kept,
+        {"misfit": "of the log's noise", "value": "the parameter's"},
+        partial(_shown, name=name),
+        partial=True,
+        allowed={"experiment": tuple(EXPERIMENTS)},
+        words={"duration": "s of each experiment", "rigs": "randomised"},
+    )
+
+
+STUDY, AT_REST = _recovery("recovery", 50, "proposed"), _recovery("recovery-rest", 10, "rest")

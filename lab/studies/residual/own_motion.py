@@ -1,0 +1,152 @@
+"""How far policies and their controller are from the motion that the controller's own impedance asks for, as hands move.
+
+Beside them stand the controller without the errors of its sensors that change in an episode, and what the others leave to any.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from agents.commands.evaluate import evaluate_learned
+from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.seeds import policy_folders
+from agents.training.configuration import TARGETS
+from agents.training.validation import validate
+from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
+from baselines.bench.statistics import crossed_interval, number, quantile
+from baselines.work.tasks import Result, Task
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from lab.studies.honest.sensor_floor import motion_floor, static_only
+from lab.studies.results import Content
+from lab.studies.study import Found, Options, Study
+from lab.studies.tables import markdown
+from lab.studies.worlds import worlds
+
+HANDS = ("steps", "sine", "noise", "guided")
+PARTS = (0.5, 0.95, 1.0)
+"""Median, 95th percentile and worst."""
+
+STATIC = "BirthSIM/Probe-v2"
+
+STEADY, FLOOR = BOUNDS = ("its sensors without noise, delays and bias", "no controller has less")
+"""The controller where sensors err by scale, distortion, gain and crosstalk alone; and what those leave to any controller."""
+
+
+def own_motion(
+    policy: str, who: str, network: str, hand: str, sensors: str, rig: dict[str, Any], seed: int, episodes: int
+) -> Result:
+    """Per world, the distance from the declared motion, mm, of a policy, of its controller or of one of ``BOUNDS``."""
+    one, believed = load_policy(Path(policy)), Parameters.from_dict(rig)
+    env: Any = gymnasium.make_vec(
+        one.environment,
+        num_envs=episodes,
+        sensors=sensors,
+        randomize=True,
+        user_force=hand,
+        parameters=static_only(believed) if who == STEADY else believed,
+        **one.settings.to_dict(),
+    )
+    if who == FLOOR:
+        found = {"error": motion_floor(env, believed, seed).tolist(), "lost": 0}
+    else:
+        zero = np.zeros((episodes, one.settings.size), np.float32)
+        score = validate(env, (lambda seen: zero) if who in ("", STEADY) else one.network.acting(), seed, TARGETS[1])
+        found = {"error": score.error.tolist(), "within": score.feasible.tolist(), "lost": score.lost}
+    env.close()
+    return found
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    rig, tasks = load_parameters(options.parameters or None), dict[Any, Task]()
+    world = {"sensors": options.sensors, "randomize": True}
+    folders = policy_folders(options.policy)
+    law = load_policy(folders[0]).settings.law
+    bounds = BOUNDS if options.sensors == "honest" else ()
+    for name, place in (*((name, folders[0]) for name in ("", *bounds)), *((one.name, one) for one in folders)):
+        network = file_hash(str(place / WEIGHTS))
+        for hand in HANDS:
+            settings = {
+                "policy": str(place), "who": name, "network": network, "hand": hand, "sensors": options.sensors,
+                "rig": rig.to_dict(), "seed": options.seed, "episodes": options.episodes,
+            }  # fmt: skip
+            tasks[hand, name] = Task(f"{hand}-{file_stem(name)}", own_motion, settings)
+        if name in bounds:
+            continue
+        own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
+        pushed, work = (own, evaluate_learned) if name else (controller_settings(law, rig), None)
+        pieces = evaluation_tasks(f"pushed-{name}", pushed, STATIC, world, options.episodes, options.seed, work)
+        tasks |= {(STATIC, name, k): piece for k, piece in enumerate(pieces)}
+    return tasks
+
+
+def _kept(options: Options, found: Found) -> Any:
+    law = load_policy(policy_folders(options.policy)[0]).settings.law
+    names = list(dict.fromkeys(name for hand, name, *_ in found if hand == HANDS[0]))
+    bounds, seeds = [name for name in names if name in BOUNDS], [name for name in names if name not in ("", *BOUNDS)]
+    groups = {law: [""], f"{options.policy}, {len(seeds)} seeds": seeds, **{name: [name] for name in bounds}}
+    rows = []
+    for hand in HANDS:
+        within = np.array(found[hand, ""]["within"])
+        errors = {name: np.array(found[hand, name]["error"])[within] for name in names}
+        for who, own in groups.items():
+            less = errors[""] - np.stack([errors[name] for name in own])
+            rows.append(
+                {
+                    "hand": hand,
+                    "who": who,
+                    "error": [quantile(errors[""] - less, part) for part in PARTS],
+                    "within": int(within.sum()),
+                    "less": None if who == law else [_mean(less), *crossed_interval(_mean, less)],
+                    "lost": sum(found[hand, name]["lost"] for name in own),
+                }
+            )
+    static = {}
+    for name in ("", *seeds):
+        pieces = [result for (what, who, *_), result in found.items() if (what, who) == (STATIC, name)]
+        sizes = np.abs(gathered(name, pieces).metrics["stiffness_error"])
+        static[name or law] = [quantile(sizes, part) for part in PARTS]
+    return {"moving": rows, "static": static}
+
+
+def _mean(values: Array) -> float:
+    return float(np.mean(values))
+
+
+def _shown(content: Content) -> dict[str, str]:
+    settings, figures = content["settings"], content["figures"]
+    rows = [["hand", "controller", "from its declared motion, mm", "less than the controller: mean, mm", "lost"]]
+    for row in figures["moving"]:
+        less = "" if row["less"] is None else "{} ({} to {})".format(*map(number, row["less"]))
+        rows.append([row["hand"], row["who"], " / ".join(map(number, row["error"])), less, str(row["lost"])])
+    static = [["controller", "static stiffness error, %"]]
+    static += [[name, " / ".join(map(number, sizes))] for name, sizes in figures["static"].items()]
+    head = (
+        f"{worlds(settings['seed'], settings['episodes'])}, `{settings['sensors']}` sensors, randomised rigs, those "
+        f"within the rig's strength. Differences compare the same worlds, with 95 % intervals. Below: `{STATIC}`."
+    )
+    moving = markdown(rows, rows[0][2:3], alike=[(hand, who in BOUNDS) for hand, who, *_ in rows[1:]])
+    return {"own-motion.md": "\n\n".join([head, moving, markdown(static, static[0])]) + "\n"}
+
+
+STUDY = Study(
+    (__name__, "agents.commands.evaluate"),
+    {
+        "policy": "circle_honest_apg",
+        "sensors": "honest",
+        "parameters": "examples/honest_sensors_rig.toml",
+        "episodes": 128,
+        "seed": 74_000_000,
+    },
+    _tasks,
+    _kept,
+    {"error": "mm", "less": "mm", "static": "%"},
+    _shown,
+    words={
+        "policy": "a folder of birthsim train, or a shipped policy",
+        "parameters": "TOML file of the rig",
+        "seed": "of the first episode",
+    },
+)

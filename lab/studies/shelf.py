@@ -1,0 +1,121 @@
+"""The results of all studies: which are stale, what shows them, and their renewal."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import cast
+
+from baselines.commands.command import perform_with
+from baselines.commands.settings import Configured
+from birthsim_env.files import write_text
+from birthsim_env.physics.compiled.sources import ROOT
+from birthsim_env.physics.rig.values import shown
+from lab.studies.door import OWN, STUDIES
+from lab.studies.results import changed, read_result
+from lab.studies.study import Study
+
+DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md")
+ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
+"""Texts that do not stand in ``DATA``."""
+
+_PICTURE = re.compile(r"\]\((?:\.\./)*(\w+\.svg)\)")
+_MARKED = re.compile(r"^<!-- results of (\w+) -->$.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)
+"""A table of a page: comments on lines of their own. A line that begins with a comment and goes on with text would be HTML to
+CommonMark, and its Markdown would stay raw, so there are no comments within lines."""
+
+
+def main() -> None:
+    """Entry point of ``birthsim study NAME`` for declared studies, and of ``OWN``."""
+    command = sys.argv[0]
+    name = command.rpartition(" ")[2]
+    if name in OWN:
+        action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
+        does = f"{OWN[name][0].upper()}{OWN[name][1:]}."
+        perform_with(command, type("Settings", (Configured,), {"__doc__": does}), lambda _: action(), "")
+    else:
+        study = declared(name)
+        perform_with(command, study.settings(STUDIES[name].measures), partial(study.measure, name), "")
+
+
+def declared(name: str) -> Study:
+    """The declaration of a study."""
+    entry = STUDIES[name]
+    return cast(Study, getattr(import_module(f"studies.{entry.module}"), entry.declaration))
+
+
+def names() -> list[str]:
+    """The declared studies."""
+    return [name for name, entry in STUDIES.items() if entry.declaration]
+
+
+def state(name: str) -> str:
+    """Whether the result of a study is of the sources that are here."""
+    study, content = declared(name), read_result(name)
+    if content is None:
+        return "not measured yet"
+    files = changed(content, study.code)
+    listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
+    usual = json.loads(json.dumps(study.options))
+    other = {key: value for key, value in content["settings"].items() if key not in usual or value != usual[key]}
+    said = "".join(f"; {shown(key)} = {shown(value)}, not {usual.get(key, 'an option')}" for key, value in other.items())
+    return (f"stale; changed: {listed}" if files else "fresh") + said
+
+
+def status() -> None:
+    """Print the state of each result, its date, its commit and its seconds."""
+    width = max(map(len, names())) + 2
+    for name in names():
+        content = read_result(name)
+        made = f"{content['date'][:10]}  {content['commit'][:7]}  {content['seconds']:8.0f} s  " if content else ""
+        print(f"{name:{width}}{made}{state(name)}")
+
+
+def texts(name: str) -> Iterator[tuple[Path, str]]:
+    """What shows the result of a study: files, and what should stand in them."""
+    if (content := read_result(name)) is not None:
+        for file, text in declared(name).show(content).items():
+            yield ELSEWHERE.get(file, DATA / file), text
+
+
+def rendered() -> dict[Path, str]:
+    """Every file that shows results, and what should stand in it."""
+    found = {path: text for name in names() for path, text in texts(name)}
+    tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
+    for page in PAGES:
+        found[page] = _MARKED.sub(
+            lambda mark: f"<!-- results of {mark[1]} -->\n\n{tables[mark[1]]}\n<!-- end -->", page.read_text(encoding="utf-8")
+        )
+    return found
+
+
+def render() -> None:
+    """Write what differs."""
+    for path, text in rendered().items():
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+            print(path.relative_to(ROOT))
+
+
+def draw() -> None:
+    """Draw the pictures of every result that a page of docs shows."""
+    shown = {name for page in (ROOT / "docs").rglob("*.md") for name in _PICTURE.findall(page.read_text(encoding="utf-8"))}
+    for name in names():
+        if (content := read_result(name)) is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                for path in declared(name).draw(content, Path(folder)):
+                    if path.name in shown:
+                        shutil.copy(path, ROOT / "docs")
+
+
+def renew() -> None:
+    """Run what is not fresh or was measured with other settings, each with its own defaults."""
+    for name in names():
+        if state(name) != "fresh":
+            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True, cwd=ROOT)

@@ -1,0 +1,139 @@
+"""``birthsim study soak``: 10^8 policy steps over all scenarios, laws, sensors and corners of the ranges, on one thread.
+
+Every lap is written as it ends; interrupted (Ctrl-C), the same command carries on. It exits with 1 where an observation,
+reward or state was not finite or outside its space, or where memory grew.
+"""
+
+import json
+import platform
+import sys
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from tqdm import tqdm
+
+from baselines.commands.settings import Configured, Seed, whole
+from baselines.work.side_by_side import ONE_THREAD
+from baselines.work.tasks import code_stamp
+from birthsim_env.files import make_folder, write_json, write_text
+from birthsim_env.physics.rig.json_reading import parse_json
+from lab.studies.alone import only_under
+from lab.studies.soak.laps import LANES, STEPS, run
+
+GROWTH = 10.0
+"""MB by which the last tenth of a soak may need more than the sixth; by then all kernels are loaded."""
+
+Laps = list[dict[str, Any]]
+
+
+def stored(path: Path, setting: dict[str, Any]) -> Laps:
+    """The laps of an interrupted soak; ``ValueError`` where the file is of another."""
+    if not path.is_file():
+        write_text(path, json.dumps(setting) + "\n")
+        return []
+    head, *lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True) or [""]
+    if parse_json(f"laps = {str(path)!r}", head, dict) != setting:
+        raise ValueError(f"{path} is of other code or another seed; allowed: another --out")
+    # A kill leaves half a line at the end.
+    whole = [line for line in lines if line.endswith("\n")]
+    if len(whole) < len(lines):
+        write_text(path, head + "".join(whole))
+    return [parse_json(f"laps = {str(path)!r}", line, dict) for line in whole]
+
+
+def growth(laps: Laps) -> float:
+    """MB between the sixth tenth of the laps and the last, medians; 0 where they are few."""
+    tenths = [np.median(part) for part in np.array_split([lap["rss"] for lap in laps], 10)] if len(laps) >= 20 else [0.0] * 10
+    return float(tenths[-1] - tenths[5])
+
+
+def table(laps: Laps) -> str:
+    """Markdown: steps, episodes and faults by scenario and by what controls."""
+    lines = ["| experiment | policy steps | episodes ended by the rig | by the clock | faults |", "|---|---|---|---|---|"]
+    for key in ("scenario", "control"):
+        groups: dict[str, Laps] = defaultdict(list)
+        for lap in laps:
+            groups[lap[key]].append(lap)
+        for name, own in sorted(groups.items()):
+            sums = [sum(lap[column] for lap in own) for column in ("steps", "terminated", "truncated")]
+            lines.append(
+                f"| {name} | {' | '.join(f'{number:,}' for number in sums)} | {sum(len(lap['faults']) for lap in own)} |"
+            )
+    return "\n".join(lines)
+
+
+def report(laps: Laps, setting: dict[str, Any]) -> str:
+    """What a soak has found, Markdown."""
+    steps, seconds = sum(lap["steps"] for lap in laps), sum(lap["seconds"] for lap in laps)
+    memory = [lap["rss"] for lap in laps]
+    tenths = ", ".join(f"{np.median(part):.0f}" for part in np.array_split(memory, min(10, len(memory))))
+    return "\n".join(
+        [
+            "# Soak",
+            "",
+            f"`make soak` ran {steps:,} policy steps in {len(laps)} laps of {LANES} lanes (rigs side by side). It took "
+            f"{seconds / 3600:.1f} h on one thread ({steps / seconds:,.0f} steps/s, {platform.machine()}).",
+            "",
+            "Each lap has other conditions. The rigs are at a corner of the ranges of domain randomisation, or drawn from "
+            "them. Friction law, sensors and hand differ. The action is random openings or flows, a residual with random "
+            "actions on some law, or a rival.",
+            "",
+            "Every step was checked. Observations are finite and inside their space, rewards are finite and from 0 to 1, and "
+            "states and `info` are finite.",
+            "",
+            table(laps),
+            "",
+            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Median memory in each tenth of the run, MB: {tenths}. It grew "
+            f"by {growth(laps):.1f} MB from the sixth tenth to the last.",
+            "",
+            f"Seed {setting['seed']}, BirthSIM {setting['code']['version']}, sources {setting['code']['sources'][:12]}.",
+            "",
+        ]
+    )
+
+
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Run policy steps over all that there is; interrupted, the same command carries on."""
+
+    steps: Annotated[int, whole()] = 10**8
+    """Policy steps."""
+    seed: Seed = 0
+    out: Path = Path("out/soak")
+    """Folder for laps.jsonl, soak.md and soak.json."""
+
+
+def main(settings: Settings) -> None:
+    """Run the laps that are missing."""
+    only_under(ONE_THREAD)
+    setting = {"seed": settings.seed, "lanes": LANES, "steps": STEPS, "code": code_stamp("lab.studies.soak.laps")}
+    journal = make_folder(settings.out) / "laps.jsonl"
+    laps = stored(journal, setting)
+    wanted = -(-settings.steps // (LANES * STEPS))
+    done = sum(lap["steps"] for lap in laps)
+    try:
+        with (
+            tqdm(total=wanted * LANES * STEPS, initial=done, unit=" steps", unit_scale=True) as bar,
+            journal.open("a", encoding="utf-8") as file,
+        ):
+            for number in range(len(laps), wanted):
+                lap = run(number, settings.seed, progress=bar.update).to_dict()
+                file.write(json.dumps(lap) + "\n")
+                file.flush()
+                laps.append(lap)
+                bar.n = sum(one["steps"] for one in laps)
+                for fault in lap["faults"]:
+                    bar.write(f"lap {number}, {lap['scenario']}, {lap['control']}: {fault}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print(f"interrupted: {len(laps)} of {wanted} laps are kept; the same command carries on", file=sys.stderr)
+    if not laps:
+        return
+    text = report(laps, setting)
+    write_text(settings.out / "soak.md", text)
+    write_json(settings.out / "soak.json", {**setting, "laps": laps})
+    print(text)
+    if growth(laps) > GROWTH or any(lap["faults"] for lap in laps):
+        raise SystemExit(1)
