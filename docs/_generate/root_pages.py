@@ -9,8 +9,8 @@ PAGES = {
     "README.md": "readme",
     "CHANGELOG.md": "changelog",
     "CONTRIBUTING.md": "contributing",
-    "SECURITY.md": "security",
-    "THIRD_PARTY.md": "third_party",
+    ".github/SECURITY.md": "security",
+    "packaging/THIRD_PARTY.md": "third_party",
 }
 """File -> its page in docs/project."""
 
@@ -23,5 +23,5 @@ def root_page(name: str) -> str:
         text = re.sub(r"\]\((docs/[^)#]+)#[^)]*\)", r"](\1)", text)
     text = re.sub(r"\]\(docs/", "](../", text)
     for file, page in PAGES.items():
-        text = text.replace(f"]({file})", f"]({page}.md)")
+        text = text.replace(f"]({file})", f"]({page}.md)").replace(f"](../{file})", f"]({page}.md)")
     return text

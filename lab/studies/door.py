@@ -89,4 +89,4 @@ def main(arguments: list[str]) -> None:
         raise SystemExit(2)
     sys.argv = ["", *rest]
     declared = name in OWN or STUDIES[name].declaration
-    perform(f"birthsim study {name}", "studies", "shelf" if declared else STUDIES[name].module)
+    perform(f"birthsim study {name}", "lab.studies", "shelf" if declared else STUDIES[name].module)

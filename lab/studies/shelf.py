@@ -47,7 +47,7 @@ def main() -> None:
 def declared(name: str) -> Study:
     """The declaration of a study."""
     entry = STUDIES[name]
-    return cast(Study, getattr(import_module(f"studies.{entry.module}"), entry.declaration))
+    return cast(Study, getattr(import_module(f"lab.studies.{entry.module}"), entry.declaration))
 
 
 def names() -> list[str]:

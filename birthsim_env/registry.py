@@ -1,0 +1,172 @@
+"""The one registry: whatever has a name that a user may type registers itself, in its own file.
+
+    @register(controller="adrc", about="Active disturbance rejection.", needs={"force sensor"})
+    class ADRC(StagedController): ...
+
+A kind has rooms, packages whose modules are imported when somebody first asks for that kind; so a file that stands in a room is
+found, and nothing else names it. Another distribution adds entries by an entry point of the group ``birthsim.plugins``, which
+names a module that registers. Help, tests, tables of the documentation and lists of the page iterate ``entries``.
+"""
+
+import pkgutil
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from birthsim_env.physics.rig.values import near, problem, shown
+
+T = TypeVar("T")
+
+ROOMS: dict[str, tuple[str, ...]] = {
+    "controller": ("baselines.backstepping", "baselines.admittance", "baselines.rivals", "baselines.uncontrolled"),
+    "sensors": ("birthsim_env.parts.sensors",),
+    "scenario": ("birthsim_env.parts.scenarios",),
+    "hand": ("birthsim_env.parts.hands",),
+    "policy": ("agents.policy",),
+    "reader": ("birthsim_env.tables",),
+    "export": ("agents.commands", "birthsim_build.commands", "birthsim_live.commands"),
+    "device": ("birthsim_env.parts", "birthsim_build.device"),
+    "study": ("lab.studies",),
+}
+"""Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""
+
+PLUGINS = "birthsim.plugins"
+"""Entry point group of other distributions' modules."""
+
+LAST = 1000
+"""``order`` of an entry that says none."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One registered thing.
+
+    Parameters
+    ----------
+    kind, name : str
+        What it is, one of ``ROOMS``, and what a user types.
+    made : object
+        What was registered: a class, a function, or an object.
+    about : str
+        What it is, in a sentence.
+    needs : frozenset of str
+        What it cannot do without, such as ``"force sensor"``, ``"acceleration sensor"``, or an extra, ``"extra agents"``.
+    listed : bool
+        Whether lists show it that do not show everything: scores, the page, the comparison.
+    options : mapping
+        What ``made`` is called with, where the entry is another one with options.
+    deprecated : str
+        What takes its place; "" where it stays.
+    order : int
+        Where lists show it; equal ones stand in alphabetical order.
+    """
+
+    kind: str
+    name: str
+    made: Any
+    about: str
+    needs: frozenset[str] = frozenset()
+    listed: bool = True
+    options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    deprecated: str = ""
+    order: int = LAST
+
+    @property
+    def module(self) -> str:
+        """The module in which it is registered."""
+        return _WHERE[self.kind, self.name]
+
+
+_ENTRIES: dict[str, dict[str, Entry]] = {kind: {} for kind in ROOMS}
+_WHERE: dict[tuple[str, str], str] = {}
+_ENTERED: set[str] = set()
+_BROKEN: dict[str, str] = {}
+
+
+def register(
+    *,
+    about: str,
+    needs: Iterable[str] = (),
+    listed: bool = True,
+    options: Mapping[str, Any] | None = None,
+    deprecated: str = "",
+    order: int = LAST,
+    **named: str,
+) -> Callable[[T], T]:
+    """A decorator that registers what it stands above, under ``kind="name"``; it returns it as it is.
+
+    Raises
+    ------
+    ValueError
+        For no kind of ``ROOMS``, more than one, or a name that another module has taken.
+    """
+    if len(named) != 1 or not set(named) <= set(ROOMS):
+        raise ValueError(f"register({', '.join(named)}); allowed: one of {', '.join(ROOMS)}")
+    ((kind, name),) = named.items()
+
+    def keep(made: T) -> T:
+        where = str(sys._getframe(1).f_globals["__name__"])
+        if _WHERE.setdefault((kind, name), where) != where:
+            raise ValueError(f"{kind} = {shown(name)} is registered by {_WHERE[kind, name]}; allowed in {where}: another name")
+        preset = MappingProxyType(dict(options or {}))
+        _ENTRIES[kind][name] = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order)
+        return made
+
+    return keep
+
+
+def _enter(kind: str) -> None:
+    """Import the rooms of a kind, and other distributions' modules."""
+    if kind in _ENTERED:
+        return
+    _ENTERED.add(kind)
+    for room in ROOMS[kind]:
+        if find_spec(room.partition(".")[0]) is None or find_spec(room) is None:
+            continue
+        package = import_module(room)
+        for module in pkgutil.walk_packages(getattr(package, "__path__", []), f"{room}."):
+            import_module(module.name)
+    for point in entry_points(group=PLUGINS):
+        if point.value not in _ENTERED:
+            _ENTERED.add(point.value)
+            try:
+                point.load()
+            except Exception as error:
+                _BROKEN[point.name] = problem(error)
+                warnings.warn(f"plugin {point.name!r} is left out: {problem(error)}", stacklevel=3)
+
+
+def entries(kind: str, listed: bool | None = None) -> list[Entry]:
+    """Everything of a kind, in the order in which lists show it; with ``listed`` those that are, or are not."""
+    _enter(kind)
+    found = (one for one in _ENTRIES[kind].values() if listed is None or one.listed is listed)
+    return sorted(found, key=lambda one: (one.order, one.name))
+
+
+def names(kind: str, listed: bool | None = None) -> list[str]:
+    """The names of ``entries``."""
+    return [one.name for one in entries(kind, listed)]
+
+
+def entry(kind: str, name: str, more: str = "") -> Entry:
+    """The entry of a name.
+
+    Raises
+    ------
+    ValueError
+        Names what is unknown, what it is near to, and what there is; ``more`` adds what else is allowed.
+    """
+    _enter(kind)
+    if name in _ENTRIES[kind]:
+        return _ENTRIES[kind][name]
+    known = names(kind)
+    asked = near(name, known)
+    allowed = "a registered name" if asked else ", ".join(known)
+    broken = "".join(f"; plugin {plugin!r} is left out: {why}" for plugin, why in _BROKEN.items())
+    raise ValueError(f"{kind} = {shown(name)}{asked}; allowed: {allowed}{more}{broken}")
