@@ -26,16 +26,18 @@ from birthsim_env.physics.rig.values import near, problem, shown
 T = TypeVar("T")
 
 ROOMS: dict[str, tuple[str, ...]] = {
-    "controller": ("baselines.backstepping", "baselines.admittance", "baselines.rivals", "baselines.uncontrolled"),
+    "controller": (
+        "baselines.backstepping", "baselines.admittance", "baselines.rivals", "baselines.uncontrolled", "agents.policy.shipped",
+    ),
     "sensors": ("birthsim_env.parts.sensors",),
     "scenario": ("birthsim_env.parts.scenarios",),
     "hand": ("birthsim_env.parts.hands",),
-    "policy": ("agents.policy",),
+    "policy": ("agents.policy.shipped",),
     "reader": ("birthsim_env.tables",),
     "export": ("agents.commands", "birthsim_build.commands", "birthsim_live.commands"),
     "device": ("birthsim_env.parts", "birthsim_build.device"),
     "study": ("lab.studies",),
-}
+}  # fmt: skip
 """Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""
 
 PLUGINS = "birthsim.plugins"
