@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from baselines.backstepping.controller import BacksteppingController
     from baselines.bench.evaluation import Evaluation, evaluate
     from baselines.controller import Controller
-    from baselines.registry import controller_names, make_controller
+    from baselines.registry import make_controller
 
 _PLACES = {
     "AdmittanceController": "admittance.controller",
@@ -17,7 +17,6 @@ _PLACES = {
     "CartesianBackstepping": "backstepping.cartesian_controller",
     "Controller": "controller",
     "Evaluation": "bench.evaluation",
-    "controller_names": "registry",
     "evaluate": "bench.evaluation",
     "make_controller": "registry",
 }
@@ -25,7 +24,7 @@ _PLACES = {
 
 __all__ = [
     "AdmittanceController", "BacksteppingController", "CartesianBackstepping", "Controller", "Evaluation",
-    "controller_names", "evaluate", "make_controller",
+    "evaluate", "make_controller",
 ]  # fmt: skip
 
 

@@ -15,6 +15,9 @@ from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_finite, is_within, limits, problem, shown
 
+RESIDUAL = "residual"
+"""The controller with a trained policy; ``residual:circle`` names its policy."""
+
 BEYOND = 1000.0
 """A gain may be so many times below the lowest, or above the highest, that tuning tries."""
 

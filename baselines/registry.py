@@ -1,29 +1,21 @@
-"""Controllers by name: the table, other packages' entry points, and a user's own file.
+"""Controllers by name: what is registered, with options, and a user's own file.
 
-A factory takes the rig as its owner describes it, and keyword options, and returns a ``Controller``.
+What is registered makes a controller of the rig as its owner describes it, and of options.
 """
 
 import inspect
 import os
-from collections.abc import Callable
-from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, get_type_hints
 
-from baselines.about import RESIDUAL
-from baselines.admittance.controller import AdmittanceController
-from baselines.backstepping.cartesian_controller import CartesianBackstepping
-from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import Controller, check_flags, is_ready, made_controller
+from baselines.controller import RESIDUAL, Controller, controller_of, is_ready, made_controller
 from baselines.limiter.controller import PortLimiter
-from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.staged import StagedController
-from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
+from baselines.uncontrolled import Uncontrolled
 from birthsim_env.extras import installation
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import near, shown
-
-Factory = Callable[..., Controller]
+from birthsim_env.registry import Entry, entries, entry, names
 
 LIMITED = "limited:"
 """Before a controller's name: the controller in a ``PortLimiter``."""
@@ -31,46 +23,33 @@ LIMITED = "limited:"
 GUARDING = ("on_fault", "fault_time")
 """Options of every compiled controller: what happens where a sensor says nothing finite, see ``StagedController.protect``."""
 
-ENTRY_POINTS = "birthsim.controllers"
-"""Entry point group by which a package that builds on this one adds controllers."""
+OWN_FILE = ", or path/to/file.py:Name"
 
 
-def _backstepping(parameters: Parameters, cartesian: bool = False, **options: Any) -> Controller:
-    check_flags({"cartesian": cartesian})
-    return CartesianBackstepping(parameters, **options) if cartesian else BacksteppingController(parameters, **options)
+def compiled_names(listed: bool | None = None) -> list[str]:
+    """Registered controllers that are stages, of which other targets are built; with ``listed`` those that are, or are not."""
+    return [one.name for one in entries("controller", listed) if _makes(one.made, StagedController)]
 
 
-CONTROLLERS: dict[str, Factory] = {
-    "backstepping": _backstepping,
-    "admittance": AdmittanceController,
-    "pid": PositionPID,
-    "lqr": LinearQuadratic,
-    "sliding-mode": SlidingMode,
-    "nonlinear-mpc": NonlinearMPC,
-}
-
-SHORT_NAMES = {
-    "backstepping-weight": "backstepping[weight_compensation=true]",
-    "backstepping-frozen": "backstepping[weight_compensation=true,frozen_friction=true]",
-    "backstepping-one-valve": "backstepping[weight_compensation=true,valves=one_valve]",
-    "backstepping-force-first": "backstepping[force_first=true]",
-    "backstepping-cartesian": "backstepping[cartesian=true]",
-    "admittance-backstepping": "admittance[learn=false]",
-    "admittance-adaptive": "admittance",
-    "admittance-sensorless": "admittance[force_sensor=false]",
-}
-"""Short name -> controller with options. Tables, trained policies and recordings have the short names."""
-
-LISTED = ("backstepping", *SHORT_NAMES, "pid", "lqr", "sliding-mode", "nonlinear-mpc")
-"""Controllers that scores, the page and the stored bits have."""
-
-UNCONTROLLED: dict[str, Factory] = {"shut-valves": ShutValves, "slammed-valves": SlammedValves, "random-valves": RandomValves}
-"""What any controller should beat; ``birthsim study comparison`` leaves them out."""
+def uncontrolled_names() -> list[str]:
+    """What any controller should beat."""
+    return [one.name for one in entries("controller") if _makes(one.made, Uncontrolled)]
 
 
-def controller_names() -> list[str]:
-    """Every registered name; options, and what ``SHORT_NAMES`` abbreviates, come on top."""
-    return [*CONTROLLERS, *UNCONTROLLED, *(point.name for point in entry_points(group=ENTRY_POINTS))]
+def controlling_names() -> list[str]:
+    """Listed controllers that look at the rig."""
+    return [one.name for one in entries("controller", listed=True) if not _makes(one.made, Uncontrolled)]
+
+
+def _makes(part: Any, base: type) -> bool:
+    """Whether what a part makes derives from a class, by the class that it is, or that a function says to return."""
+    kind = get_type_hints(part).get("return") if inspect.isfunction(part) else part
+    return inspect.isclass(kind) and issubclass(kind, base)
+
+
+def _known(kind: str) -> dict[str, Entry]:
+    """Name -> entry, of which ``used`` takes no note."""
+    return {one.name: one for one in entries(kind)}
 
 
 def split_options(name: str) -> tuple[str, dict[str, Any]]:
@@ -82,10 +61,10 @@ def split_options(name: str) -> tuple[str, dict[str, Any]]:
         return name, {}
     plain, _, listed = name[:-1].partition("[")
     options: dict[str, Any] = {}
-    for entry in listed.split(","):
-        key, equals, value = (text.strip() for text in entry.partition("="))
+    for part in listed.split(","):
+        key, equals, value = (text.strip() for text in part.partition("="))
         if not (equals and key.isidentifier() and value):
-            raise ValueError(f"controller = {shown(name)}: {shown(entry)}; allowed: name[gain=60,other=2]")
+            raise ValueError(f"controller = {shown(name)}: {shown(part)}; allowed: name[gain=60,other=2]")
         try:
             options[key] = {"true": True, "false": False}[value.lower()] if value.lower() in ("true", "false") else float(value)
         except ValueError:
@@ -93,13 +72,33 @@ def split_options(name: str) -> tuple[str, dict[str, Any]]:
     return plain, options
 
 
+def with_brackets(name: str, options: dict[str, Any]) -> str:
+    """The inverse of ``split_options``."""
+    listed = ",".join(f"{key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in options.items())
+    return f"{name}[{listed}]" if listed else name
+
+
 def resolved(name: str) -> tuple[str, dict[str, Any]]:
-    """The registered name of a controller, or its file, without limits, and its options, also those of a short name."""
+    """The registered name of a controller, or its file, without limits, and its options.
+
+    Of entries that make the same controller it is the first without options, so that ``backstepping-weight`` is
+    ``backstepping[weight_compensation=true]``.
+    """
+    plain, options = _asked(name)
+    known = _known("controller")
+    if plain not in known:
+        return plain, options
+    own = known[plain]
+    alike = (one.name for one in known.values() if one.made is own.made and not one.options)
+    return next(alike, plain), {**own.options, **options}
+
+
+def _asked(name: str) -> tuple[str, dict[str, Any]]:
+    """The name of an entry, or a file, as it is asked for, and the options that it carries."""
     plain, options = split_options(name.removeprefix(LIMITED))
     if plain.startswith(f"{RESIDUAL}:"):
         return RESIDUAL, {"policy": plain.removeprefix(f"{RESIDUAL}:"), **options}
-    registered, own = split_options(SHORT_NAMES.get(plain, plain))
-    return registered, {**own, **options}
+    return plain, options
 
 
 def bare_name(name: str) -> str:
@@ -107,49 +106,42 @@ def bare_name(name: str) -> str:
     return resolved(name)[0]
 
 
-def _factory(name: str) -> Factory:
-    """What makes the controller ``name`` without its options; ``ValueError`` names what is unknown and what there is."""
-    plain = bare_name(name)
-    if plain in CONTROLLERS or plain in UNCONTROLLED:
-        return (CONTROLLERS | UNCONTROLLED)[plain]
-    for point in entry_points(group=ENTRY_POINTS):
-        if point.name == plain:
-            try:
-                factory: Factory = point.load()
-            except ImportError as error:
-                needs = f"; a policy needs the extra: {installation('agents')}" if plain == RESIDUAL else ""
-                raise ValueError(f"{error}{needs}") from error
-            return factory
+def _part(plain: str) -> Any:
+    """What makes the controller of a ``bare_name``; ``ValueError`` names what is unknown and what there is."""
     if plain.rpartition(":")[0].endswith(".py"):
-        return _Own(plain, from_file("controller", plain))
-    names = controller_names()
-    asked = near(plain, names)
-    allowed = "a registered name" if asked else ", ".join(names)
-    raise ValueError(f"controller = {shown(split_options(name)[0])}{asked}; allowed: {allowed}, or path/to/file.py:Class")
+        return from_file("controller", plain)
+    return entry("controller", plain, OWN_FILE).made
 
 
-class _Own:
-    """Makes the controller of a user's ``part``."""
+def uses_force(name: str) -> bool:
+    """Whether a controller is told the hand's force.
 
-    def __init__(self, name: str, part: Any) -> None:
-        self.name, self.part = name, part
-
-    def __call__(self, parameters: Parameters, **options: Any) -> Controller:
-        return made_controller(self.name, self.part, parameters, options)
+    A registered controller says what it needs, and a policy that comes with the package what is needed with it; the option
+    ``force_sensor=false`` takes the need away. Of a user's own class the attribute ``reads_force`` counts, where it has one,
+    and of a policy in a folder what it was trained with. The limits of ``limited:`` need the force.
+    """
+    plain, options = resolved(name)
+    if name.startswith(LIMITED):
+        return True
+    known, policies, policy = _known("controller"), _known("policy"), options.get("policy")
+    if plain not in known:
+        return bool(getattr(_part(plain), "reads_force", True))
+    if policy is not None and policy not in policies:
+        return bool(getattr(make_controller(name), "reads_force", True))
+    needs = known[plain].needs if policy is None else policies[policy].needs
+    return "force sensor" in needs and bool(options.get("force_sensor", True))
 
 
 def known_options(name: str) -> list[str] | None:
     """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
-    factory: Any = _factory(name)
-    kind = factory.part if isinstance(factory, _Own) else getattr(factory, "func", factory)
-    if is_ready(kind) or not callable(kind):
+    plain = bare_name(name)
+    known = _known("controller").get(plain)
+    part = _part(plain) if known is None else known.made
+    if is_ready(part) or not callable(part):
         return []
-    parameters = list(inspect.signature(kind).parameters.values())
-    named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(kind, "TUNABLE", {})
-    guarded = GUARDING if inspect.isclass(kind) and issubclass(kind, StagedController) else ()
-    if kind is _backstepping:
-        law = CartesianBackstepping if resolved(name)[1].get("cartesian") else BacksteppingController
-        return [*list(inspect.signature(law).parameters)[1:], *named, *GUARDING]
+    parameters = list(inspect.signature(part).parameters.values())
+    named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(part, "TUNABLE", {})
+    guarded = GUARDING if _makes(part, StagedController) else ()
     closed = tunable or len(named) + 1 == len(parameters)
     return [*named, *tunable, *guarded] if closed else None
 
@@ -157,29 +149,40 @@ def known_options(name: str) -> list[str] | None:
 def make_controller(name: str | os.PathLike[str], parameters: Parameters | None = None, **options: Any) -> Controller:
     """The controller ``name``, or what a user's own file has, given as ``path/to/file.py:Name``.
 
-    A name may be short (``SHORT_NAMES``) and carry options, ``pid[bandwidth=60]``, or a policy, ``residual:circle``.
-    ``limited:`` before it puts the law behind the limits of ``PortLimiter``. ``parameters`` are what environments take too.
-    ``options`` are those of the controller, as its name carries them. Raises ``ValueError`` naming what is unknown and what
-    there is.
+    A name may carry options, ``pid[bandwidth=60]``, or a policy, ``residual:circle``. ``limited:`` before it puts the law
+    behind the limits of ``PortLimiter``. ``parameters`` are what environments take too. ``options`` are those of the
+    controller, as its name carries them. Raises ``ValueError`` naming what is unknown and what there is.
     """
     if not isinstance(name, (str, os.PathLike)):
-        raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(controller_names())}, or path/to/file.py:Name")
+        raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(names('controller'))}{OWN_FILE}")
     name, rig = os.fspath(name), load_parameters(parameters)
     plain, named = resolved(name)
-    known = known_options(name)
-    for option, value in {**named, **options}.items():
+    known, given = known_options(name), {**named, **options}
+    for option, value in given.items():
         if known is not None and option not in known:
             allowed = ", ".join(known) or "no options"
             raise ValueError(
                 f"controller = {shown(name)}: {option} = {shown(value)} is unknown{near(option, known)}; allowed for {plain}: "
                 f"{allowed}"
             )
-    given = {**named, **options}
     guarding = {option: given.pop(option) for option in GUARDING if option in given}
-    law = _factory(name)(rig, **given)
+    law = _made(_asked(name)[0], rig, given)
     whole = PortLimiter(law, rig) if name.startswith(LIMITED) else law
     if not guarding:
         return whole
     if not isinstance(whole, StagedController):
         raise ValueError(f"{', '.join(guarding)} for controller = {shown(name)}; allowed: for a controller of the package")
     return whole.protect(**guarding)
+
+
+def _made(asked: str, rig: Parameters, options: dict[str, Any]) -> Controller:
+    """The controller of an entry's name or of a file; ``ValueError`` names the extra that is missing."""
+    part = _part(asked)
+    if asked not in _known("controller"):
+        return made_controller(asked, part, rig, options)
+    try:
+        made: Controller = controller_of(part) if is_ready(part) else part(rig, **options)
+    except ImportError as error:
+        extras = [need.removeprefix("extra ") for need in _known("controller")[asked].needs if need.startswith("extra ")]
+        raise ValueError(f"{error}; {asked} needs {installation(*extras)}") from error
+    return made

@@ -8,13 +8,19 @@ from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_count
+from birthsim_env.registry import LAST, register
 from birthsim_env.restored import Declared, Kept
 
 HELD = 0.01
 """s that a random opening is held: the default policy period."""
 
 
-class ShutValves:
+class Uncontrolled:
+    """The base of what looks at nothing, so that comparisons know what any controller should beat."""
+
+
+@register(controller="shut-valves", about="All valves stay shut: the rig is a spring of air.", order=LAST + 1)
+class ShutValves(Uncontrolled):
     """Spools in the middle: what leaks apart, the chambers are air springs."""
 
     opening = (0.0, 0.0, 0.0, 0.0)
@@ -31,13 +37,15 @@ class ShutValves:
         """Nothing is remembered."""
 
 
+@register(controller="slammed-valves", about="Fully open valves drive both pistons out.", order=LAST + 2)
 class SlammedValves(ShutValves):
     """Both pistons driven out with fully open valves."""
 
     opening = (1.0, -1.0, 1.0, -1.0)
 
 
-class RandomValves:
+@register(controller="random-valves", about="Valves open at random.", order=LAST + 3)
+class RandomValves(Uncontrolled):
     """Uniform openings, drawn anew every ``HELD`` s from a generator that begins with ``seed``."""
 
     in_state: ClassVar[Declared] = {"_count": Kept(0, 2**62, whole=True), "_openings": Kept(-1.0, 1.0)}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tqdm import tqdm
 
 from baselines.commands.episodes import driven
-from baselines.registry import LISTED
+from baselines.registry import compiled_names
 from baselines.staged import NO_ACTION
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -18,11 +18,11 @@ class Settings:
 
 def main(_: Settings) -> None:
     """Step each controller once."""
-    rig, began = Parameters(), time.perf_counter()
-    with tqdm(LISTED, desc="compiling", unit=" controllers", leave=False) as bar:
+    rig, began, names = Parameters(), time.perf_counter(), compiled_names(listed=True)
+    with tqdm(names, desc="compiling", unit=" controllers", leave=False) as bar:
         for name in bar:
             env = driven("BirthSIM/Circle-v1", name, rig, sensors="lab")
             env.reset(seed=0)
             env.step(NO_ACTION)
             env.close()
-    print(f"{len(LISTED)} controllers are compiled: {time.perf_counter() - began:.1f} s")
+    print(f"{len(names)} controllers are compiled: {time.perf_counter() - began:.1f} s")

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from baselines.about import RESIDUAL
+from baselines.controller import RESIDUAL
 from birthsim_build.image import Part, Words, function_name
 from birthsim_build.loops import PAIRED_VALVES, World, image_of, law_part, plant_world, scenario_world
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id

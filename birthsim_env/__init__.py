@@ -4,7 +4,7 @@ Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v2``, ``Descent
 ``Vacuum-v0``, and their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
 """
 
-from gymnasium.envs.registration import register, registry
+from gymnasium.envs import registration
 
 from birthsim_env.gradients.linear.linearize import balanced_pressures, linearize, linearize_lanes
 from birthsim_env.gradients.linear.model import LinearModel
@@ -33,5 +33,5 @@ _KINDS = {
 for _scenario in SCENARIOS:
     for _kind, (_single, _vector) in _KINDS.items():
         _id = environment_id(_scenario, _kind)
-        if _id not in registry:
-            register(_id, entry_point=_single, vector_entry_point=_vector, kwargs={"scenario": _scenario})
+        if _id not in registration.registry:
+            registration.register(_id, entry_point=_single, vector_entry_point=_vector, kwargs={"scenario": _scenario})

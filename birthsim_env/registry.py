@@ -10,8 +10,10 @@ names a module that registers. Help, tests, tables of the documentation and list
 
 import pkgutil
 import sys
+import threading
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -24,16 +26,18 @@ from birthsim_env.physics.rig.values import near, problem, shown
 T = TypeVar("T")
 
 ROOMS: dict[str, tuple[str, ...]] = {
-    "controller": ("baselines.backstepping", "baselines.admittance", "baselines.rivals", "baselines.uncontrolled"),
+    "controller": (
+        "baselines.backstepping", "baselines.admittance", "baselines.rivals", "baselines.uncontrolled", "agents.policy.shipped",
+    ),
     "sensors": ("birthsim_env.parts.sensors",),
     "scenario": ("birthsim_env.parts.scenarios",),
     "hand": ("birthsim_env.parts.hands",),
-    "policy": ("agents.policy",),
+    "policy": ("agents.policy.shipped",),
     "reader": ("birthsim_env.tables",),
     "export": ("agents.commands", "birthsim_build.commands", "birthsim_live.commands"),
     "device": ("birthsim_env.parts", "birthsim_build.device"),
     "study": ("lab.studies",),
-}
+}  # fmt: skip
 """Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""
 
 PLUGINS = "birthsim.plugins"
@@ -87,6 +91,8 @@ _ENTRIES: dict[str, dict[str, Entry]] = {kind: {} for kind in ROOMS}
 _WHERE: dict[tuple[str, str], str] = {}
 _ENTERED: set[str] = set()
 _BROKEN: dict[str, str] = {}
+_ENTERING = threading.RLock()
+_RECORDS: list[set[tuple[str, str]]] = []
 
 
 def register(
@@ -111,35 +117,66 @@ def register(
     ((kind, name),) = named.items()
 
     def keep(made: T) -> T:
-        where = str(sys._getframe(1).f_globals["__name__"])
-        if _WHERE.setdefault((kind, name), where) != where:
+        where, there = str(sys._getframe(1).f_globals["__name__"]), _ENTRIES[kind].get(name)
+        # A module that is loaded again makes its classes anew, and registers these.
+        if there is not None and (_WHERE[kind, name] != where or there.made is made or _called(there.made) != _called(made)):
             raise ValueError(f"{kind} = {shown(name)} is registered by {_WHERE[kind, name]}; allowed in {where}: another name")
         preset = MappingProxyType(dict(options or {}))
+        _WHERE[kind, name] = where
         _ENTRIES[kind][name] = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order)
         return made
 
     return keep
 
 
+def _called(made: Any) -> str:
+    """The name of what is registered, or of its type."""
+    return str(getattr(made, "__qualname__", type(made).__qualname__))
+
+
 def _enter(kind: str) -> None:
-    """Import the rooms of a kind, and other distributions' modules."""
-    if kind in _ENTERED:
+    """Import the rooms of a kind, and other distributions' modules; once, whichever thread asks first."""
+    with _ENTERING:
+        if kind in _ENTERED:
+            return
+        _ENTERED.add(kind)
+        try:
+            for room in ROOMS[kind]:
+                _enter_room(room)
+        except BaseException:
+            _ENTERED.discard(kind)
+            raise
+        for point in entry_points(group=PLUGINS):
+            if point.value not in _ENTERED:
+                _ENTERED.add(point.value)
+                try:
+                    point.load()
+                except Exception as error:
+                    _BROKEN[point.name] = problem(error)
+                    warnings.warn(f"plugin {point.name!r} is left out: {problem(error)}", stacklevel=4)
+
+
+def _enter_room(room: str) -> None:
+    """Import a room's modules, where it is installed."""
+    if find_spec(room.partition(".")[0]) is None or find_spec(room) is None:
         return
-    _ENTERED.add(kind)
-    for room in ROOMS[kind]:
-        if find_spec(room.partition(".")[0]) is None or find_spec(room) is None:
-            continue
-        package = import_module(room)
-        for module in pkgutil.walk_packages(getattr(package, "__path__", []), f"{room}."):
-            import_module(module.name)
-    for point in entry_points(group=PLUGINS):
-        if point.value not in _ENTERED:
-            _ENTERED.add(point.value)
-            try:
-                point.load()
-            except Exception as error:
-                _BROKEN[point.name] = problem(error)
-                warnings.warn(f"plugin {point.name!r} is left out: {problem(error)}", stacklevel=3)
+    package = import_module(room)
+    for module in pkgutil.walk_packages(getattr(package, "__path__", []), f"{room}."):
+        import_module(module.name)
+
+
+@contextmanager
+def used() -> Iterator[set[tuple[str, str]]]:
+    """A context in which every entry is noted that ``entry`` gives, in any thread: a set of (kind, name).
+
+    Lists of entries do not count: what goes over all of a kind uses those that it takes up by name.
+    """
+    asked: set[tuple[str, str]] = set()
+    _RECORDS.append(asked)
+    try:
+        yield asked
+    finally:
+        _RECORDS[:] = [one for one in _RECORDS if one is not asked]
 
 
 def entries(kind: str, listed: bool | None = None) -> list[Entry]:
@@ -155,7 +192,7 @@ def names(kind: str, listed: bool | None = None) -> list[str]:
 
 
 def entry(kind: str, name: str, more: str = "") -> Entry:
-    """The entry of a name.
+    """The entry of a name; ``used`` takes note of it. One that is deprecated warns of what takes its place.
 
     Raises
     ------
@@ -163,8 +200,15 @@ def entry(kind: str, name: str, more: str = "") -> Entry:
         Names what is unknown, what it is near to, and what there is; ``more`` adds what else is allowed.
     """
     _enter(kind)
-    if name in _ENTRIES[kind]:
-        return _ENTRIES[kind][name]
+    found = _ENTRIES[kind].get(name)
+    if found is not None:
+        for record in _RECORDS:
+            record.add((kind, name))
+        if found.deprecated:
+            warnings.warn(
+                f"{kind} = {name!r} is deprecated; {found.deprecated} takes its place", DeprecationWarning, stacklevel=2
+            )
+        return found
     known = names(kind)
     asked = near(name, known)
     allowed = "a registered name" if asked else ", ".join(known)

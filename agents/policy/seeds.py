@@ -14,9 +14,7 @@ from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquarti
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.schema import fault
 from birthsim_env.physics.rig.values import near, path_of, shown
-
-SHIPPED = Path(__file__).resolve().parent.parent / "policies"
-"""Trained policies that come with the package, a folder per configuration and in it one per seed."""
+from birthsim_env.registry import entry, names
 
 SHOWN = ("settled_rms", "settled_rms_x", "settled_rms_y", "stiffness_error", "hunting_x", "hunting_y", "saturation", "air")
 """Metrics of the table over seeds, where an episode says something about them."""
@@ -26,22 +24,16 @@ COLUMNS = ("metric", "unit", "statistic", "law", "residual", "low", "high")
 """Of ``seed_figures``; low and high are the residual's interval."""
 
 
-def shipped_names() -> list[str]:
-    """Configurations whose policies come with the package."""
-    return sorted(path.name for path in SHIPPED.iterdir() if path.is_dir()) if SHIPPED.is_dir() else []
-
-
 def policy_folders(path: str | os.PathLike[str]) -> list[Path]:
-    """The policy folders at ``path``: itself, or its ``seed_*`` in order; or those of a shipped name.
+    """The policy folders at ``path``: itself, or its ``seed_*`` in order; or those of a registered name.
 
     Raises ``ValueError`` where there is none.
     """
     text = path_of(path)
+    known = names("policy")
     if text is None:
-        raise ValueError(
-            f"policy = {shown(path)}; allowed: a folder that birthsim train wrote, or {', '.join(shipped_names())}"
-        )
-    folder = SHIPPED / text if text in shipped_names() else Path(text)
+        raise ValueError(f"policy = {shown(path)}; allowed: a folder that birthsim train wrote, or {', '.join(known)}")
+    folder = entry("policy", text).made if text in known else Path(text)
     if (folder / WEIGHTS).is_file():
         return [folder]
     found = sorted(
@@ -50,8 +42,8 @@ def policy_folders(path: str | os.PathLike[str]) -> list[Path]:
     )
     if not found:
         raise ValueError(
-            f"policy = {shown(text)} holds no policy{near(text, shipped_names())}; "
-            f"allowed: a folder that birthsim train wrote, or {', '.join(shipped_names())}"
+            f"policy = {shown(text)} holds no policy{near(text, known)}; "
+            f"allowed: a folder that birthsim train wrote, or {', '.join(known)}"
         )
     return found
 

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from baselines.registry import resolved
+from baselines.registry import resolved, uses_force
 from birthsim_env.assembly import one_of
 from birthsim_env.physics.rig.values import is_within, make_plain, shown
 
@@ -14,16 +14,19 @@ LAWS = (
     *("admittance-backstepping", "admittance-adaptive", "admittance-sensorless"),
     NO_LAW,
 )
-"""Laws that take forces to believe in, the paper's first; and none, where a policy drives the valves by itself."""
-
-FORCE_LAWS = ("admittance-backstepping", "admittance-adaptive")
-"""Those that read the hand's force."""
+"""Laws that take forces to believe in and were tried with policies, the paper's first: with one valve a cylinder, and with a
+plan for every millisecond, nobody has. And none, where a policy drives the valves by itself."""
 
 VALVES = 4
 """Length of an action without a law: the openings of all spools."""
 
 IMPEDANCES = {"fixed": 2, "variable_kp": 4, "variable": 5}
 """Impedance mode (the vocabulary of robosuite) -> length of an action: forces; and stiffness; and damping."""
+
+
+def needs_force(law: str) -> bool:
+    """Whether a law of ``LAWS`` reads the hand's force."""
+    return law != NO_LAW and uses_force(law)
 
 
 def is_one_of(name: str, allowed: tuple[str, ...]) -> bool:
@@ -43,7 +46,8 @@ class ResidualSettings:
       friction comes on top.
     - ``time_constant`` (s) of the low-pass between an action and the law: without it single lanes oscillate.
     - ``policy_period`` (s).
-    - ``force_sensor``: without one, neither a law of ``FORCE_LAWS`` nor an impedance that varies, which need the hand's force.
+    - ``force_sensor``: without one, neither a law that ``needs_force`` nor an impedance that varies, which needs the hand's
+      force.
     - ``informed``: the policy also observes ``agents.residual.insight``.
 
     Raises ``ValueError`` for values outside these limits.
@@ -71,10 +75,10 @@ class ResidualSettings:
             raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
         for name in ("force_sensor", "informed"):
             object.__setattr__(self, name, one_of(name, getattr(self, name), (True, False)))
-        if not self.force_sensor and (self.impedance != "fixed" or is_one_of(self.law, FORCE_LAWS)):
+        if not self.force_sensor and (self.impedance != "fixed" or needs_force(self.law)):
             raise ValueError(
                 f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' "
-                f"and a law other than {', '.join(map(repr, FORCE_LAWS))}, which need the hand's force"
+                f"and a law other than {', '.join(repr(law) for law in LAWS if needs_force(law))}, which need the hand's force"
             )
 
     @property

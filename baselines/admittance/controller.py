@@ -25,6 +25,7 @@ from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import register
 
 LEAST_FRACTION = 0.35
 """Lower bound of the gain reduction. With less gain friction holds the piston."""
@@ -57,6 +58,32 @@ LAB = {
 }
 
 
+@register(
+    controller="admittance",
+    about="Another name of admittance-adaptive, to which options are given.",
+    needs={"force sensor"},
+    listed=False,
+    order=20,
+)
+@register(
+    controller="admittance-backstepping",
+    about="Measures the hand's force, and moves the rig to where the spring would be.",
+    needs={"force sensor"},
+    options={"learn": False},
+    order=21,
+)
+@register(
+    controller="admittance-adaptive",
+    about="The admittance law, which also learns friction, light masses, noise and its force sensor's bias.",
+    needs={"force sensor"},
+    order=22,
+)
+@register(
+    controller="admittance-sensorless",
+    about="The admittance law, with the hand's force estimated from pressures and motion.",
+    options={"force_sensor": False},
+    order=23,
+)
 class AdmittanceController(StagedController):
     """Renders any stiffness matrix through friction.
 

@@ -16,8 +16,14 @@ from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, shown
+from birthsim_env.registry import register
 
 
+@register(
+    controller="backstepping-cartesian",
+    about="The paper's law in Cartesian coordinates: stiffness along x and y may be coupled.",
+    order=15,
+)
 class CartesianBackstepping(StagedController):
     """The law of ``cartesian_law``: weight compensated, force before pneumatic stiffness, no force sensor.
 

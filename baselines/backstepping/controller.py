@@ -26,6 +26,7 @@ from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, plain, shown
+from birthsim_env.registry import register
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -87,6 +88,35 @@ def _inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms)
     backstepping_law.law(seen, joints, terms, p, options, n)
 
 
+@register(
+    controller="backstepping",
+    about="The paper's law: position and stiffness from pressures, without a force sensor.",
+    order=10,
+)
+@register(
+    controller="backstepping-weight",
+    about="The paper's law, which also carries the weight of what moves.",
+    options={"weight_compensation": True},
+    order=11,
+)
+@register(
+    controller="backstepping-frozen",
+    about="The paper's law with weight compensation; friction is left out where its model errs at rest.",
+    options={"weight_compensation": True, "frozen_friction": True},
+    order=12,
+)
+@register(
+    controller="backstepping-one-valve",
+    about="The paper's law with one valve a cylinder: pneumatic stiffness runs free.",
+    options={"weight_compensation": True, "valves": "one_valve"},
+    order=13,
+)
+@register(
+    controller="backstepping-force-first",
+    about="The paper's law; where a valve saturates, pneumatic stiffness gives way to force.",
+    options={"force_first": True},
+    order=14,
+)
 class BacksteppingController(StagedController):
     """Backstepping control of position, pneumatic and closed-loop stiffness (Herzig et al. 2015, section IV and Fig. 3).
 

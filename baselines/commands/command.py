@@ -4,16 +4,17 @@ import os
 import re
 import signal
 import sys
+import textwrap
 import warnings
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar, get_args, get_type_hints
 
 from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Dict
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
-from baselines.commands.settings import Configured
+from baselines.commands.settings import CONTROLLER, Configured
 from baselines.commands.start import endings
 
 S = TypeVar("S")
@@ -67,10 +68,25 @@ def _file(app: App, commands: tuple[str, ...], options: ArgumentCollection) -> N
 
 def perform_with(name: str, settings: type[S], action: Callable[[S], None], example: str) -> None:
     """Read the settings and act."""
-    act(name, lambda: _read_and_act(program(name, settings, example), action))
+    act(name, lambda: _read_and_act(program(name, settings, example), settings, action))
 
 
-def _read_and_act(app: App, action: Callable[[Any], None]) -> None:
+def _named(settings: type) -> str:
+    """The controllers and policies that a command of these settings takes, for the end of its help; "" where it takes none."""
+    if not any(CONTROLLER in get_args(hint) for hint in get_type_hints(settings, include_extras=True).values()):
+        return ""
+    from birthsim_env.registry import names  # loads what it lists
+
+    lists = {"controllers": names("controller"), "policies, as residual:circle": names("policy")}
+    return (
+        "\n".join(textwrap.fill(f"{title}: {', '.join(found)}", 80, break_on_hyphens=False) for title, found in lists.items())
+        + "\n\n"
+    )
+
+
+def _read_and_act(app: App, settings: type, action: Callable[[Any], None]) -> None:
+    if {"--help", "-h"} & {*sys.argv[1:]}:
+        app.help_epilogue = f"{_named(settings)}{app.help_epilogue or ''}"
     try:
         given = app(sys.argv[1:])
     except CycloptsError as error:

@@ -74,11 +74,8 @@ RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOM
 MANY = Parameter(consume_multiple=True)
 """An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
-NAMES = (
-    "backstepping, admittance, pid, lqr, sliding-mode, nonlinear-mpc, residual or another registered name, with options as in "
-    "'admittance[learn=false]', or path/to/file.py:Class."
-)
-"""Help of an option that names controllers."""
+NAMES = "the controllers below, with options as in 'admittance[learn=false]', or path/to/file.py:Class."
+"""Help of an option that names controllers; a command that has one lists them at the end of its help."""
 Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]
 Controllers = Annotated[
     list[str] | None,

@@ -31,7 +31,7 @@ from baselines.bench.statistics import penalize_lost
 from baselines.commands.settings import CONTROLLER, WORLD, Kind, Parts, RigFile, Seed, Set, whole
 from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
-from baselines.registry import CONTROLLERS, make_controller, split_options
+from baselines.registry import make_controller, split_options
 from baselines.tables import aligned
 from baselines.work.tasks import Task, result_of
 from birthsim_env.extras import installation
@@ -42,6 +42,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, shown
+from birthsim_env.registry import entries
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -71,8 +72,7 @@ def bounds_of(name: str, rig: Parameters) -> Bounds:
     kind = type(make_controller(name, rig))
     bounds = getattr(kind, "TUNABLE", None)
     if not bounds:
-        makers = {other: getattr(factory, "func", factory) for other, factory in CONTROLLERS.items()}
-        known = ", ".join(other for other, maker in makers.items() if getattr(maker, "TUNABLE", None))
+        known = ", ".join(one.name for one in entries("controller") if getattr(one.made, "TUNABLE", None))
         raise ValueError(f"controller = {name!r} has no gains to tune; allowed: {known}, or path/to/file.py:Class with TUNABLE")
     for gain, (low, high) in bounds.items():
         if not 0 <= low < high < math.inf:

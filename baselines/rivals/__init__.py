@@ -2,13 +2,5 @@
 
 All follow the same compliant motion (``baselines.estimation.admittance``) and know the same of the rig: its mass, weight and
 friction and the measured user force. What differs is the loop round each piston; the MPC plans for both together, with
-a model that ``symbolic_model`` gives in symbols.
+a model that ``symbolic.symbolic_model`` gives in symbols. A controller is a file here, which registers itself.
 """
-
-from baselines.rivals.lqr import LinearQuadratic
-from baselines.rivals.pid import PositionPID
-from baselines.rivals.predictive import NonlinearMPC
-from baselines.rivals.sliding_mode import SlidingMode
-from baselines.rivals.symbolic import symbolic_model
-
-__all__ = ["LinearQuadratic", "NonlinearMPC", "PositionPID", "SlidingMode", "symbolic_model"]

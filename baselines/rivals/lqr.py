@@ -28,6 +28,7 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, number, part, rows
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import register
 
 RATE_TOLERANCE = 1000.0
 """N/s at the end effector; assumed: what the valves give cylinder 1 with something to spare. Only ratios to it matter."""
@@ -123,6 +124,12 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     return 0
 
 
+@register(
+    controller="lqr",
+    about="A linear regulator on the motion that the spring would make; its gains weigh error against effort.",
+    needs={"force sensor"},
+    order=31,
+)
 class LinearQuadratic(TrackingController):
     """LQR with integral action about the compliant motion (this module).
 

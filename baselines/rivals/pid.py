@@ -24,6 +24,7 @@ from birthsim_env.physics import valves
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Numbers, number, part
+from birthsim_env.registry import register
 
 
 @helper
@@ -92,6 +93,12 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     return 0
 
 
+@register(
+    controller="pid",
+    about="A position controller on the motion that the spring would make: what most would try first.",
+    needs={"force sensor"},
+    order=30,
+)
 class PositionPID(TrackingController):
     """Position PID with a pressure loop inside (this module), following the compliant motion.
 

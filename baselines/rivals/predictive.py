@@ -35,6 +35,7 @@ from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.compiled.records import part
 from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import register
 
 __all__ = ["GENERATED", "NonlinearMPC"]
 
@@ -129,6 +130,12 @@ def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, 
     return missed
 
 
+@register(
+    controller="nonlinear-mpc",
+    about="Plans 57 ms ahead at every millisecond, with a model of the rig.",
+    needs={"force sensor"},
+    order=33,
+)
 class NonlinearMPC(StagedController):
     """The controller of this module.
 

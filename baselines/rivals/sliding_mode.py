@@ -24,6 +24,7 @@ from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Numbers, number, part
+from birthsim_env.registry import register
 
 
 class Constants(Numbers):
@@ -71,6 +72,12 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     return 0
 
 
+@register(
+    controller="sliding-mode",
+    about="A sliding-mode controller on the motion that the spring would make.",
+    needs={"force sensor"},
+    order=32,
+)
 class SlidingMode(TrackingController):
     """Third-order sliding mode about the compliant motion (this module).
 

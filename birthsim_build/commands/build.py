@@ -9,9 +9,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from baselines.about import RESIDUAL
+from agents.policy.shipped import loadable_names
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
-from baselines.registry import LISTED
+from baselines.controller import RESIDUAL
+from baselines.registry import compiled_names
 from baselines.tables import aligned
 from birthsim_build.building import Report, build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import make_bundle, scenario_of
@@ -103,7 +104,7 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
     if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        return list(SCENARIOS), list(SENSORS), list(LISTED), _shipped()
+        return list(SCENARIOS), list(SENSORS), compiled_names(listed=True), _shipped()
     scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
     controllers = settings.controller or ([] if settings.policy else ["backstepping"])
     return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy
@@ -118,11 +119,10 @@ def _this_processor() -> str:
 
 
 def _shipped() -> list[str]:
-    try:
-        from agents.policy.seeds import shipped_names
-    except ImportError as error:
-        raise ValueError(f"{error}; --all needs the extra: {installation('agents')}") from error
-    return shipped_names()
+    found = loadable_names()
+    if not found:
+        raise ValueError(f"--all needs the extra: {installation('agents')}")
+    return found
 
 
 def _show(report: Report) -> None:

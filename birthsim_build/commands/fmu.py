@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, Configured, Env, RigFile, Seed, Sensors
+from baselines.controller import RESIDUAL
 from birthsim_build.bundle import identifier, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.fmu.archive import BINARIES, VERSIONS, write_fmu

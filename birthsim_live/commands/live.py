@@ -7,8 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, MANY, Configured, RigFile, number, whole
+from baselines.controller import RESIDUAL
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_live.commands.serving import need_server, serve

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 import birthsim_env
-from baselines.about import RESIDUAL
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import Controller
-from baselines.registry import LISTED, UNCONTROLLED, make_controller
+from baselines.controller import RESIDUAL, Controller
+from baselines.registry import make_controller
 from baselines.rivals.tracking import TrackingController
 from baselines.staged import StagedController
 from birthsim_build.faces.module import Store
@@ -32,6 +31,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
+from birthsim_env.registry import names
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
@@ -79,13 +79,13 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         return _part(plant_stage(rigs, np.zeros((FurtherStates.size, 1)), period))
 
     learns = [LEARNING] if policies else []
-    names = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
+    chosen = [*names("controller", listed=True), *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period
-    laws = {name: law for name in names if is_compiled(law := _made(name, rig))}
+    laws = {name: law for name in chosen if is_compiled(law := _made(name, rig))}
     parts = {name: controller_parts(law) for name, law in laws.items()}
     if functions is not None:
         parts = {name: own for name, own in parts.items() if _needed(own) <= set(functions)}
-    controllers = [controller_choice(name) for name in names if name in parts or name not in others]
+    controllers = [controller_choice(name) for name in chosen if name in parts or name not in others]
     for one in controllers:
         if one["name"] not in parts:
             one["missing"] = WITHOUT

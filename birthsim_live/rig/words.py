@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import birthsim_env
-from baselines.about import CONTROLLERS, RESIDUAL
+from baselines.controller import RESIDUAL
 from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.registry import entries
 
 FIGURES = {
     "the hand feels": "Force over displacement along the force: how stiff the head seems to the hand that pulls it.",
@@ -43,7 +44,7 @@ CHOICES = {
     },
     "scenario": {name: scenario.about for name, scenario in SCENARIOS.items()},
 }
-"""Setting -> choice -> what it is; controllers have theirs in ``baselines.about``."""
+"""Setting -> choice -> what it is; controllers say it where they are registered."""
 
 LEARNING = "learning"
 """The controller that learns in the page."""
@@ -63,10 +64,11 @@ def controller_choice(name: str) -> dict[str, str]:
         return {"name": name, "title": title, "about": f"A law and a trained policy that corrects it: {policy}."}
     if name == LEARNING:
         return {"name": name, "title": "learning here", "about": "A network at the valves, which learns in this page."}
+    about = {one.name: one.about for one in entries("controller")}
     return {
         "name": name,
         "title": Path(name).name.replace("-", " "),
-        "about": CONTROLLERS.get(name, "A controller of your own."),
+        "about": about.get(name, "A controller of your own."),
     }
 
 

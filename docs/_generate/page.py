@@ -1,6 +1,6 @@
 """What the page of ``birthsim live`` says where something is chosen or shown: the same sentences, as tables."""
 
-from baselines import about
+from birthsim_env.registry import entries
 from birthsim_live.rig.words import CHOICES, FIGURES
 
 
@@ -8,7 +8,7 @@ def page() -> str:
     """A table for scenarios, controllers, valves, sensors and figures."""
     sections = {
         "Scenarios": CHOICES["scenario"],
-        "Controllers": about.CONTROLLERS,
+        "Controllers": {one.name: one.about for one in entries("controller", listed=True)},
         "Valves": CHOICES["valves"],
         "Sensors": CHOICES["sensors"],
         "Figures, plots and pictures": FIGURES,

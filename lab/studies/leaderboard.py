@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.seeds import shipped_names
-from baselines.about import RESIDUAL
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.commands.evaluate import Settings as Evaluated
 from baselines.commands.settings import Configured
-from baselines.registry import controller_names, make_controller, resolved
+from baselines.controller import RESIDUAL
+from baselines.registry import make_controller, resolved
 from birthsim_env import Parameters, normalized_score, reference_scores
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each, Listed
 from birthsim_env.physics.rig.values import in_line, shown
+from birthsim_env.registry import names
 from lab.studies.tables import markdown
 from lab.studies.worlds import worlds
 
@@ -142,7 +142,7 @@ def _not_allowed(name: str, folder: Path) -> str:
             if _is_policy(name.removeprefix(f"{RESIDUAL}:"), folder)
             else (f"{said}; allowed: {RESIDUAL}: and a shipped policy, or the name of a folder beside the entry, without links")
         )
-    registered = [one for one in controller_names() if one != RESIDUAL]
+    registered = [one for one in names("controller") if one != RESIDUAL]
     if not _REGISTERED.fullmatch(name) or resolved(name)[0] not in registered:
         return (
             f"{said}; allowed: {', '.join(registered)}, with options as in pid[bandwidth=60]; {RESIDUAL}:POLICY; FILE.py:NAME "
@@ -158,7 +158,7 @@ def _not_allowed(name: str, folder: Path) -> str:
 def _is_policy(name: str, folder: Path) -> bool:
     """Whether a policy is shipped, or is in a folder beside the entry that holds no links."""
     own = folder / name
-    if name in shipped_names():
+    if name in names("policy"):
         return True
     return bool(_NAME.fullmatch(name)) and own.is_dir() and not any(one.is_symlink() for one in (own, *own.rglob("*")))
 

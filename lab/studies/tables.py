@@ -5,7 +5,6 @@ from collections.abc import Container, Hashable, Sequence
 
 import numpy as np
 
-from baselines.about import uses_force as uses_force
 from baselines.bench.statistics import number
 
 

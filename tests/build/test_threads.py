@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from llvmlite.binding import llvm_version_info
 
-from baselines.registry import LISTED
+from baselines.registry import compiled_names
 from birthsim_build.code import threads
 from birthsim_build.code.compiler import LEAST_LLVM, compile_object
 from birthsim_build.device.export import write_programs
@@ -122,7 +122,7 @@ def test_a_hundred_thousand_threads():
 def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
     """Of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
     made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
-    laws = (*LISTED, "residual:circle")
+    laws = (*compiled_names(listed=True), "residual:circle")
     made += [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
     functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
     compile_object(sorted(functions | LOOKS), "ptx", tmp_path / "all.o", threads=threads.Threads(1024))

@@ -12,14 +12,14 @@ from agents.residual.settings import IMPEDANCES
 from agents.training.configuration import ALGORITHMS
 from baselines.commands import train
 from baselines.commands.command import program
-from baselines.commands.settings import NAMES, RANDOMIZE, Configured, Kind, Randomize
+from baselines.commands.settings import RANDOMIZE, Configured, Kind, Randomize
 from baselines.commands.start import load
-from baselines.registry import CONTROLLERS
 from birthsim.door import COMMANDS
 from birthsim.export import FORMS
 from birthsim_env.parts.drawn.randomization import RANDOMIZE as WORDS
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.registry import names
 from tests.console import assert_says, call
 
 EXAMPLES = {
@@ -78,9 +78,10 @@ def test_choices_that_help_lists_are_those_that_there_are(monkeypatch, capsys):
     assert set(get_args(Kind)) == {"ideal", "lab", "honest"} <= set(SENSORS)  # other tests register another one
     assert set(get_args(get_args(Randomize)[0])) == set(RANDOMIZE)
     assert set(RANDOMIZE.values()) == set(WORDS)
-    assert [name for name in CONTROLLERS if name not in NAMES] == []
     hints = get_type_hints(train.Settings)
     for option, known in (("algorithm", ALGORITHMS), ("impedance", IMPEDANCES)):
         assert set(get_args(get_args(hints[option])[0])) == set(known)
     _, printed, _ = call("run", monkeypatch, capsys, "--help")
     assert [name for name in HANDS if not re.search(rf" {name}[,;]", printed)] == []
+    listed = [name for part in printed.split("controllers: ")[1].split("\nexample")[0].split("\n") for name in part.split(", ")]
+    assert [name for name in (*names("controller"), *names("policy")) if name not in " ".join(listed)] == []

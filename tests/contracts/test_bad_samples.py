@@ -9,7 +9,7 @@ import pytest
 
 from agents.policy.controller import ResidualController
 from baselines.limiter.controller import PortLimiter
-from baselines.registry import LISTED, make_controller
+from baselines.registry import compiled_names, make_controller
 from baselines.staged import StagedController
 from birthsim_env import Parameters, Reference
 from birthsim_env.loop import guard
@@ -18,10 +18,10 @@ from tests.oracles import closed_loop
 
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
-CONTROLLERS = [
-    *LISTED, "limited:pid", "limited:admittance-adaptive", "residual:circle", "residual:circle_lab_apg",
-    "residual:circle_honest_student",
-]  # fmt: skip
+COMPILED = compiled_names(listed=True)
+POLICIES = ["residual:circle", "residual:circle_lab_apg", "residual:circle_honest_student"]
+"""On a law, on the valves, and one that remembers."""
+CONTROLLERS = [*COMPILED, "limited:pid", "limited:admittance-adaptive", *POLICIES]
 SIGNALS = ("time", "position", "position_time", "velocity", "acceleration", "pressures", "user_force")
 VALUES = (math.nan, math.inf, -math.inf, 1e300)
 NO_PLACE = [("position", (0, 1), 0.0), ("position", (0, 1), 1e-4), ("position_time", 0, 1e9), ("position_time", 0, 5.0)]
@@ -81,22 +81,6 @@ def test_one_bad_sample_moves_the_head_no_further_than_a_late_one(name, sensors)
     env.close()
 
 
-@pytest.mark.parametrize("name", ["backstepping", "admittance-sensorless", "lqr"])
-def test_a_controller_says_whether_it_reads_the_force(name):
-    """What does not change a bit is not needed; what is needed changes some."""
-    env = world()
-    first, other = make_controller(name, RIG), make_controller(name, RIG)
-    differs = False
-    for _ in range(30):
-        measured, changed = env.measurement, env.measurement
-        changed.user_force[:] += 20.0
-        openings = first.command(measured, env.reference)
-        differs |= bool((openings != other.command(changed, env.reference)).any())
-        env.step(openings.T)
-    assert differs == first.reads_force
-    env.close()
-
-
 @pytest.mark.parametrize("signal", ["position", "pressures", "user_force", "time", "velocity"])
 @pytest.mark.parametrize(("on_fault", "opening"), guard.ON_FAULT.items())
 def test_an_outage_ends_the_control_until_it_is_reset(signal, on_fault, opening):
@@ -131,7 +115,7 @@ def test_a_signal_that_the_controller_does_not_read_may_be_missing_for_ever():
     env.close()
 
 
-@pytest.mark.parametrize("name", ["backstepping", "admittance-adaptive", "pid"])
+@pytest.mark.parametrize("name", COMPILED)
 def test_valves_stay_closed_until_every_signal_was_good_once(name):
     env, law = world(lanes=2), make_controller(name, RIG)
     for tick in range(300):
@@ -149,10 +133,7 @@ def test_valves_stay_closed_until_every_signal_was_good_once(name):
 ROWS = [(k, name) for k, (name, *_) in enumerate(Reference.entries())]
 
 
-SERVING = ("backstepping", "backstepping-cartesian", "admittance-adaptive", "pid", "nonlinear-mpc", "residual:circle_lab_apg")
-
-
-@pytest.mark.parametrize("name", SERVING)
+@pytest.mark.parametrize("name", [*COMPILED, "residual:circle_lab_apg"])
 def test_setpoints_that_are_not_finite_are_refused_by_name_and_leave_no_trace(name):
     env, law, same = world(lanes=2), make_controller(name, RIG), make_controller(name, RIG)
     for tick in range(40):
@@ -172,7 +153,7 @@ def test_setpoints_that_are_not_finite_are_refused_by_name_and_leave_no_trace(na
     env.close()
 
 
-@pytest.mark.parametrize("name", SERVING[:4])
+@pytest.mark.parametrize("name", COMPILED)
 @pytest.mark.parametrize("row", [0, 8, 9, 14])
 def test_no_impedance_is_declared_for_setpoints_that_are_not_finite(name, row):
     wanted = closed_loop.holding(np.array([[0.5], [0.0]]), 2000.0)
@@ -181,7 +162,7 @@ def test_no_impedance_is_declared_for_setpoints_that_are_not_finite(name, row):
         make_controller(name, RIG).declared_impedance(wanted)
 
 
-@pytest.mark.parametrize("name", SERVING)
+@pytest.mark.parametrize("name", [*COMPILED, "residual:circle_lab_apg"])
 def test_a_target_at_the_pivot_is_refused_and_leaves_no_trace(name):
     """No cylinder has a direction there, and memories would keep a NaN."""
     env, law, same = world(lanes=2), make_controller(name, RIG), make_controller(name, RIG)

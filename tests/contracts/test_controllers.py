@@ -8,24 +8,24 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
-from baselines.registry import CONTROLLERS, LIMITED, LISTED, controller_names, known_options, make_controller
+from baselines.registry import LIMITED, known_options, make_controller, resolved, uncontrolled_names
 from baselines.staged import COMMAND_OPTIONS
 from birthsim_env import Parameters, Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.registry import names
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
-POLICIES = [f"residual[policy={name}]" for name in shipped_names()]
-CHOICES = [*LISTED, *(name for name in controller_names() if name not in CONTROLLERS)]
+POLICIES = [f"residual[policy={name}]" for name in names("policy")]
+CHOICES = [name for name in names("controller") if name != "admittance"]  # which is admittance-adaptive
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 NAMES = [*CHOICES, IDENTIFIED, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name in NAMES for sensors in SENSORS]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
-CONTROLLED = [name for name in NAMES if not name.endswith("-valves")]
+CONTROLLED = [name for name in NAMES if name not in uncontrolled_names()]
 
 
 def made(name, rig=RIG, **options):
@@ -117,10 +117,8 @@ def test_pistons_past_their_strokes_get_openings_that_valves_have(name):
     assert np.all(np.abs(made(name).command(measured, closed_loop.holding(measured.position, 2000.0))) <= 1)
 
 
-PAPERS = ("backstepping", "backstepping-weight", "backstepping-frozen", "backstepping-one-valve", "backstepping-force-first")
-"""They render no coupling, and so refuse none."""
 WRONG = ((8, -500.0), (9, 0.0), (14, 2500.0), (14, -2000.0))
-"""Row and value, N/m, beside 2000 N/m on both axes."""
+"""Row and value, N/m, beside 2000 N/m on both axes; the last two are couplings, of which the paper's law renders none."""
 
 
 @pytest.mark.parametrize("name", CONTROLLED)
@@ -128,7 +126,7 @@ def test_a_spring_that_pushes_is_refused_by_its_lane(name):
     law, wanted = made(name), closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 2000.0)
     measured = closed_loop.ideal(closed_loop.resting_at(wanted, RIG), 0.0, np.zeros((2, 3)))
     base = law.settings.law if name.startswith("residual") else name.removeprefix(LIMITED)
-    for row, value in WRONG[: 0 if base == NO_LAW else 2 if base in PAPERS else 4]:
+    for row, value in WRONG[: 0 if base == NO_LAW else 2 if resolved(base)[0] == "backstepping" else 4]:
         springs = Reference(wanted.rows.copy())
         springs.rows[row, 2] = value
         with pytest.raises(ValueError, match=r"N/m in lane 2.*; allowed: (more than|a positive number)"):

@@ -7,16 +7,16 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.policy.seeds import shipped_names
-from baselines.registry import LISTED, make_controller
+from baselines.registry import make_controller
 from birthsim_env import Parameters
+from birthsim_env.registry import names
 
 RIG = Parameters()
 NAMES = [
-    *LISTED,
+    *names("controller", listed=True),
     "limited:admittance-adaptive",
     "limited:residual:circle_lab_apg",
-    *(f"residual:{one}" for one in shipped_names()),
+    *(f"residual:{one}" for one in names("policy")),
 ]
 COPIES = {"copy": copy.deepcopy, "pickle": lambda law: pickle.loads(pickle.dumps(law))}
 

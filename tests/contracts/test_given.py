@@ -17,13 +17,14 @@ from agents.policy.seeds import best_policy, policy_folders
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration
 from baselines import evaluate
-from baselines.registry import controller_names, known_options, make_controller
+from baselines.registry import known_options, make_controller
 from birthsim_env import Measurement, Parameters, Reference
 from birthsim_env.parts.hands import contractions, moving_hands, user_forces
 from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import checked_count, checked_number, whole_of
+from birthsim_env.registry import names
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 CIRCLE = "BirthSIM/Circle-v1"
@@ -280,7 +281,7 @@ def test_arrays_of_numbers_are_taken_whatever_made_them():
     assert floats_of(own) is own
 
 
-@pytest.mark.parametrize("name", [name for name in controller_names() if known_options(name) is not None])
+@pytest.mark.parametrize("name", [name for name in names("controller") if known_options(name) is not None])
 def test_an_option_that_a_controller_has_not_is_refused_with_those_that_it_has(name):
     known = known_options(name)
     for call in (

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents.gradients.rollouts import Worlds
-from agents.residual.settings import FORCE_LAWS, ResidualSettings
+from agents.residual.settings import LAWS, ResidualSettings, needs_force
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.shifted_reward import ShiftedReward
 from baselines import BacksteppingController, make_controller
@@ -256,7 +256,7 @@ TABLE = {
     ("cylinder1 = 25", "an instance of Cylinder"): [lambda: Parameters(cylinder1=25)],
     **{
         (f"force_sensor = False with law = '{law}'", ""): [residual(law, force_sensor=False)]
-        for law in (*FORCE_LAWS, "admittance", "admittance[learn=false]")
+        for law in (*filter(needs_force, LAWS), "admittance", "admittance[learn=false]")
     },
     ("law = 'admittance[gain=60]'", "'backstepping', "): [residual("admittance[gain=60]")],
     ("impedance = 'variable_kp'", "impedance = 'fixed'"): [residual(impedance="variable_kp", force_sensor=False)],

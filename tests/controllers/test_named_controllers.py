@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.about import uses_force
-from baselines.registry import SHORT_NAMES, make_controller, resolved
+from baselines.registry import make_controller, resolved, uses_force, with_brackets
 from birthsim_env import Parameters
+from birthsim_env.registry import entries
 from tests.bench.test_evaluation import Spy, run
 from tests.contracts.test_controllers import CONTROLLED, recorded
 
@@ -69,11 +69,13 @@ def test_two_files_of_one_name_are_two_controllers(tmp_path):
     assert numpy is np
 
 
-@pytest.mark.parametrize("name", SHORT_NAMES)
+@pytest.mark.parametrize("name", [one.name for one in entries("controller") if one.options])
 def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
-    assert resolved(name) == resolved(SHORT_NAMES[name])
+    whole = with_brackets(*resolved(name))
+    assert whole.endswith("]")
+    assert resolved(name) == resolved(whole)
     assert resolved(f"limited:{name}[lead_time=2]") == (resolved(name)[0], {**resolved(name)[1], "lead_time": 2.0})
-    short, long = (make_controller(one, RIG) for one in (name, SHORT_NAMES[name]))
+    short, long = (make_controller(one, RIG) for one in (name, whole))
     assert type(short) is type(long)
     for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
         assert one.function is other.function
@@ -89,7 +91,7 @@ def test_a_force_that_is_shown_moves_those_who_are_said_to_use_it_and_nobody_els
     for measured, wanted, _ in recorded(make_controller(made, RIG), sensors, RIG, 3, 40)[0]:
         lie = replace(measured, user_force=measured.user_force + 25.0)
         moved |= (law.command(measured, wanted) != pushed.command(lie, wanted)).any()
-    assert moved == uses_force(name)
+    assert moved == uses_force(name) == getattr(law, "reads_force", moved)
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "honest"])

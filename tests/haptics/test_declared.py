@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from baselines import about
+from baselines import registry
 from baselines.backstepping.impedance import joint_impedance
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
-from baselines.registry import LISTED, UNCONTROLLED, make_controller
+from baselines.registry import controlling_names, make_controller, uncontrolled_names
 from birthsim_env import Parameters, Reference
 from lab.studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
 from lab.studies.haptics.recording import record
@@ -31,7 +31,7 @@ def test_series_of_a_piston():
     assert missed(0.1) / missed(0.05) == pytest.approx(8, rel=0.01)
 
 
-@pytest.mark.parametrize("name", sorted(set(LISTED)))
+@pytest.mark.parametrize("name", controlling_names())
 def test_every_law_declares_the_stiffness_that_is_asked_for(name):
     """(18) loses nothing of a stiffness that is the same along x and y; mass and damping are positive definite."""
     declared = declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0]))
@@ -42,7 +42,7 @@ def test_every_law_declares_the_stiffness_that_is_asked_for(name):
             assert np.linalg.eigvalsh(matrix[..., lane] + matrix[..., lane].T).min() > 0
 
 
-@pytest.mark.parametrize("name", sorted(UNCONTROLLED))
+@pytest.mark.parametrize("name", uncontrolled_names())
 def test_what_is_no_law_declares_nothing(name):
     assert declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0])) is None
 
@@ -61,9 +61,9 @@ def test_a_coupled_stiffness_is_felt_along_the_push():
     np.testing.assert_allclose(declared.damping[..., 0] @ declared.damping[..., 0], (1.8**2) * 3.0 * k, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", sorted(set(LISTED)))
+@pytest.mark.parametrize("name", controlling_names())
 def test_who_is_said_to_use_the_force_of_the_hand_does(name):
-    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is about.uses_force(name)
+    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is registry.uses_force(name)
     assert not uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=False))
 
 

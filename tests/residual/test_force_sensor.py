@@ -4,12 +4,12 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.residual.settings import FORCE_LAWS, LAWS, NO_LAW, ResidualSettings
+from agents.residual.settings import LAWS, NO_LAW, ResidualSettings, needs_force
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensors import SENSORS
 
 CIRCLE, LANES, STEPS = "BirthSIM/CircleResidual-v1", 3, 140
-BLIND = [law for law in LAWS if law not in FORCE_LAWS]
+BLIND = [law for law in LAWS if not needs_force(law)]
 
 
 def course(law, actions, **arguments):

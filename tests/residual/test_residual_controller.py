@@ -7,7 +7,7 @@ import pytest
 from agents.policy.controller import ResidualController
 from agents.policy.files import save_policy
 from agents.residual.settings import ResidualSettings
-from baselines.registry import SHORT_NAMES, make_controller
+from baselines.registry import make_controller
 from birthsim_env import Parameters
 from tests.residual.policies import policy
 
@@ -19,7 +19,7 @@ SETTINGS = {
     "variable_kp": ResidualSettings("backstepping-frozen", "variable_kp", policy_period=0.02),
     "variable": ResidualSettings("backstepping-weight", "variable", time_constant=0.01),
     "no law": ResidualSettings("none"),
-    "without a force sensor": ResidualSettings(SHORT_NAMES["admittance-sensorless"], authority=40.0, force_sensor=False),
+    "without a force sensor": ResidualSettings("admittance[force_sensor=false]", authority=40.0, force_sensor=False),
     "with a memory": ResidualSettings("backstepping-force-first", force_sensor=False),
 }
 

@@ -6,7 +6,7 @@ import pytest
 
 from agents.residual import authority
 from agents.residual.law import ResidualActuation, ResidualLaw
-from agents.residual.settings import FORCE_LAWS, IMPEDANCES, LAWS
+from agents.residual.settings import IMPEDANCES, LAWS, needs_force
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
@@ -66,7 +66,7 @@ def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
     settings = [(size, {"impedance": name}) for name, size in IMPEDANCES.items() if size == 2 or law.startswith("backstepping")]
-    settings += [(2, {"informed": True}), *([] if law in FORCE_LAWS else [(2, {"force_sensor": False})])]
+    settings += [(2, {"informed": True}), *([] if needs_force(law) else [(2, {"force_sensor": False})])]
     for size, more in settings:
         env = single(law=law, **more, **arguments)
         assert_follows(env, np.zeros((140, size), np.float32), rows, seed=3)

@@ -6,9 +6,9 @@ from scipy.optimize import lsq_linear
 
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessTest, run_stiffness_test
-from baselines.rivals import NonlinearMPC, predictive
+from baselines.rivals import predictive
 from baselines.rivals.horizon import FLOWS, HALF, NODES, SIZE, Situation, programme
-from baselines.rivals.predictive import Constants, improve
+from baselines.rivals.predictive import Constants, NonlinearMPC, improve
 from baselines.rivals.quadratic import minimise, slope
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_columns
 from birthsim_env.physics.equilibrium import balanced_state

@@ -7,8 +7,11 @@ import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from baselines.estimation.stages import MOTION
-from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
+from baselines.rivals import lqr, pid
 from baselines.rivals.feedforward import SIGN_WIDTH, Tracked, feedforward
+from baselines.rivals.lqr import LinearQuadratic
+from baselines.rivals.pid import PositionPID
+from baselines.rivals.sliding_mode import SlidingMode
 from baselines.rivals.tracking import TrackingController
 from baselines.valve_inverse import CylinderAir
 from birthsim_env.loop.loop import Loop

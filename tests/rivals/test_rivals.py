@@ -5,7 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
+from baselines.rivals.lqr import LinearQuadratic
+from baselines.rivals.pid import PositionPID
+from baselines.rivals.sliding_mode import SlidingMode
 from baselines.rivals.tracking import Integrals, TrackingController
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters

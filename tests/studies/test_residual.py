@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from agents.policy.seeds import SHIPPED
+from agents.policy.shipped import SHIPPED
 from lab.studies.residual import beside_law, own_motion
 from tests.console import call
 

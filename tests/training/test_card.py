@@ -4,9 +4,11 @@ import pytest
 import yaml
 
 from agents.policy.files import load_policy
-from agents.policy.seeds import SHIPPED, best_policy, shipped_names
+from agents.policy.seeds import best_policy
+from agents.policy.shipped import SHIPPED
 from agents.reports.card import FIGURES, TRAINING, compared, model_card
 from baselines.bench.evaluation import Evaluation
+from birthsim_env.registry import names
 from tests.console import call
 from tests.training.test_seeds import evaluation
 
@@ -18,7 +20,7 @@ def measured(controller: str, settled: list[float], air: float) -> Evaluation:
     return one
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", names("policy"))
 def test_the_hub_reads_what_was_measured_and_readers_where_it_is_worse(name):
     card = model_card(
         best_policy(name), name, [measured("this policy", [0.2, 0.4, 9.0], 30.0), measured("pid", [0.6] * 3, 20.0)]

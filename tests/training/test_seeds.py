@@ -12,7 +12,7 @@ from scipy import stats
 from agents.commands import evaluate as command
 from agents.policy.files import FORMAT, WEIGHTS, load_policy, policy_content, save_policy
 from agents.policy.sealed import sealed, unsealed
-from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_figures, shipped_names
+from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_figures
 from agents.reports import inspection
 from agents.reports.card import compared
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
@@ -23,6 +23,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import evaluate_piece
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 from lab.studies.scores.study import _contestants
 
 
@@ -135,7 +136,7 @@ def test_of_policies_that_reached_no_finite_error_none_is_the_best(tmp_path, rea
     assert best_policy(tmp_path / "seed_1") == tmp_path / "seed_1"
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", names("policy"))
 def test_shipped_policies_load_fit_and_are_small(name):
     places = policy_folders(name)
     assert [place.name for place in places] == [f"seed_{k}" for k in range(len(places))]

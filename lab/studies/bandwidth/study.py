@@ -10,6 +10,7 @@ from baselines.bench.resting import RestingRigs
 from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Complex, declared_by, mass_spring_damper
+from baselines.registry import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array
@@ -22,7 +23,7 @@ from lab.studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_o
 from lab.studies.results import Content
 from lab.studies.sensorless.own_logs import Informed
 from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown, uses_force
+from lab.studies.tables import markdown
 
 STIFFNESS = 2000.0
 """N/m."""

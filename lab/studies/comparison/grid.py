@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from agents.policy.files import WEIGHTS
-from agents.policy.seeds import SHIPPED, policy_folders
+from agents.policy.seeds import policy_folders
+from agents.policy.shipped import SHIPPED
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import controller_settings, file_hash, file_stem
 from baselines.bench.statistics import penalize_lost
-from baselines.registry import LISTED, make_controller
+from baselines.registry import controlling_names, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.assembly import Arguments
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
@@ -110,7 +111,7 @@ WITHOUT_RATIO = ("restarts", "saturation")
 
 def default_controllers() -> list[str]:
     """Every controller that is compared but the planner, which has a page of its own."""
-    return [name for name in LISTED if name != "nonlinear-mpc"]
+    return [name for name in controlling_names() if name != "nonlinear-mpc"]
 
 
 def all_conditions(

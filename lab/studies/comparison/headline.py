@@ -4,9 +4,8 @@ import numpy as np
 
 from agents.policy.files import load_policy
 from agents.policy.seeds import policy_folders
-from baselines.about import uses_force
 from baselines.bench.statistics import number
-from baselines.registry import resolved
+from baselines.registry import resolved, uses_force
 from lab.studies.comparison.grid import LEARNED, Conditions
 from lab.studies.comparison.tables import Figures, controllers_of
 from lab.studies.comparison.told import TOLD

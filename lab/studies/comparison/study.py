@@ -6,11 +6,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from agents.policy.seeds import shipped_names
 from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import names
 from lab.studies.comparison.grid import (
     COMPARED,
     ENVIRONMENTS,
@@ -72,7 +72,7 @@ def cells(options: Options, wanted: Wanted = anywhere) -> dict[Key, Task]:
     if not conditions:
         raise ValueError(f"--plant {' '.join(options.plant)}; allowed: with --sensors honest, whose figures can be drawn")
     if "residual" in options.controller:
-        raise ValueError(f"--controller 'residual'; allowed: {LEARNED}POLICY, a folder or one of {', '.join(shipped_names())}")
+        raise ValueError(f"--controller 'residual'; allowed: {LEARNED}POLICY, a folder or one of {', '.join(names('policy'))}")
     found = {
         (name, where, member): cell_task(own, where, options.episodes, options.seed)
         for name in dict.fromkeys(options.controller)

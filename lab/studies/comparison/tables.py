@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.bench.statistics import number
+from baselines.registry import uses_force
 from lab.studies.comparison.grid import METRICS, MOVING, RIGS
-from lab.studies.tables import markdown, uses_force
+from lab.studies.tables import markdown
 
 Figures = Sequence[dict[str, Any]]
 """What ``lab.studies.comparison.grid.statistics`` returns."""

@@ -117,14 +117,10 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
     from agents.residual.env import ResidualEnv
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
-    from baselines.admittance.controller import AdmittanceController
-    from baselines.backstepping.cartesian_controller import CartesianBackstepping
-    from baselines.backstepping.controller import BacksteppingController
-    from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
-    from baselines.uncontrolled import RandomValves
     from birthsim_env.parts import references, stiffness_schedules
     from birthsim_env.parts.hands import contractions, moving_hands, user_forces
     from birthsim_env.physics.plant import Plant
+    from birthsim_env.registry import entries
 
     parts = (
         *(references.Circle, references.Path, references.Hold, stiffness_schedules.StiffnessSchedule),
@@ -137,10 +133,10 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
         ),
         *(moving_hands.Sine, moving_hands.Noise, moving_hands.Guided),
     )
-    laws = (AdmittanceController, CartesianBackstepping, BacksteppingController, LinearQuadratic, PositionPID, SlidingMode)
+    laws = [one.made for one in entries("controller") if inspect.isclass(one.made)]
     return {
         **{part.__name__: (part, False) for part in parts},
-        **{law.__name__: (law, True) for law in (*laws, RandomValves)},
+        **{law.__name__: (law, True) for law in laws},
         "TrainingSettings": (TrainingSettings, False), "ResidualSettings": (ResidualSettings, False), "Plant": (Plant, False),
         "ResidualEnv": (ResidualEnv, False),
     }  # fmt: skip

@@ -10,7 +10,7 @@ from baselines.bench.evaluation import Evaluation, evaluate_worlds
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
 from baselines.identification.quantities import value_of
-from baselines.registry import make_controller
+from baselines.registry import make_controller, uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
@@ -24,7 +24,7 @@ from lab.studies.comparison.grid import as_described
 from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
 from lab.studies.results import Content
 from lab.studies.study import Options, Study
-from lab.studies.tables import markdown, uses_force
+from lab.studies.tables import markdown
 
 ENVIRONMENT = environment_id("probe")
 PUSHED = SCENARIOS["probe"].duration - PROBE_REST

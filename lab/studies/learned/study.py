@@ -12,13 +12,14 @@ from agents.policy.seeds import as_table, policy_folders, seed_figures
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
 from baselines.bench.statistics import jsonable
+from baselines.registry import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from lab.studies.learned import felt
 from lab.studies.results import Content
 from lab.studies.study import Found, Options, Study
-from lab.studies.tables import cells, markdown, uses_force
+from lab.studies.tables import cells, markdown
 from lab.studies.worlds import worlds
 
 
@@ -150,10 +151,11 @@ def _beside(figures: dict[str, Any]) -> str:
             own = {row[0]: row[1:] for row in every if row[2] == controller}
             tracks = [cells(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()]
             touch = [cells(found["felt"][controller][name][:2]) for name in felt.COLUMNS]
-            name = controller.replace("residual", policy) if controller.startswith("residual") else controller
+            learned = controller.startswith("residual")
+            name = controller.replace("residual", policy) if learned else controller
             of, _, lost, *_ = own["lost episodes"]
             rows.append([world, name, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
-            alike.append((policy, uses_force(name)))
+            alike.append((policy, uses_force(f"residual:{policy}" if learned else controller)))
     return f"{_worlds(figures)}\n\n{markdown(rows, rows[0][2:-1], alike=alike)}\n"
 
 

@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 
 from agents.policy.files import WEIGHTS, load_policy
-from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
+from agents.policy.seeds import policy_folders
+from agents.policy.shipped import SHIPPED
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
-from baselines.registry import UNCONTROLLED, make_controller
+from baselines.registry import make_controller, uncontrolled_names
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 from birthsim_env.scores import RIGS, ROLES, SENSORS
 from lab.studies.comparison.grid import ENVIRONMENTS, default_controllers
 from lab.studies.results import Content, written
@@ -47,9 +49,9 @@ def _tasks(options: Options) -> dict[Any, Task]:
 def _contestants(environment: str) -> Iterable[tuple[str, str]]:
     """Names and policy folders ("" for a law) of whatever is measured in an environment: of policies, those that were trained
     with sensors of the table."""
-    for law in (*UNCONTROLLED, *default_controllers()):
+    for law in (*uncontrolled_names(), *default_controllers()):
         yield law, ""
-    for name in shipped_names():
+    for name in names("policy"):
         if name.partition("_")[0] == _short(environment).lower():
             for folder in (one for one in policy_folders(name) if load_policy(one).training["sensors"] in SENSORS):
                 yield f"{name} {folder.name}", f"{name}/{folder.name}"
@@ -108,7 +110,7 @@ def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
         return max(names, key=lambda name: float(rows[name]["halves"][0]))
 
     laws = default_controllers()
-    learned = [name for name in rows if name not in laws and name not in UNCONTROLLED]
+    learned = [name for name in rows if name not in laws and name not in uncontrolled_names()]
     chosen = ("shut-valves", "random-valves", "backstepping", best(laws), *([best(learned)] if learned else []))
     return {
         role: {

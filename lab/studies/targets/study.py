@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines.registry import LISTED
+from baselines.registry import compiled_names
 from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
@@ -96,7 +96,7 @@ def built(target: str) -> Result:
         return _threads(rig)
     require_linker()
     if target == "every":
-        bundle = make_bundle(rig, SCENARIOS, SENSORS, LISTED, [POLICY])
+        bundle = make_bundle(rig, SCENARIOS, SENSORS, compiled_names(listed=True), [POLICY])
     elif target == "cortex-m7":
         bundle = make_bundle(rig, (), ["ideal", "lab"], LAWS, alone=True)
     else:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents.policy import seeds
+from agents.policy.shipped import SHIPPED
 from birthsim_live.logs.recording import COLUMNS, load_recording
 from tests.console import run as command
 from tests.live.browser import CALM, Window, served
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
-    own = shutil.copytree(seeds.SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
+    own = shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
     done = command("live", "--static", folder, "--policy", own)
     assert f"written to {folder}" in done.stdout, done.stderr
     return folder

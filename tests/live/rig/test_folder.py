@@ -5,7 +5,8 @@ import shutil
 import numpy as np
 
 from agents import ResidualController, load_policy
-from agents.policy.seeds import SHIPPED, best_policy
+from agents.policy.seeds import best_policy
+from agents.policy.shipped import SHIPPED
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import packed_page, write_page
 from birthsim_live.rig.pack import controller_parts

@@ -14,10 +14,11 @@ import gymnasium
 import numpy as np
 
 from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy, shipped_names
-from baselines.registry import LISTED, make_controller
+from agents.policy.seeds import best_policy
+from baselines.registry import controlling_names, make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.registry import names
 
 FILE = Path(__file__).parent / "fingerprints.json"
 LANES, SEED = 3, 7
@@ -27,9 +28,9 @@ PERIODS, STEPS = 800, 80
 
 def rows() -> dict[str, tuple[str, str, str]]:
     """Name -> (scenario, sensors, who drives: "openings", "residual" or a controller)."""
-    chosen = [("circle", "lab", name) for name in LISTED]
+    chosen = [("circle", "lab", name) for name in controlling_names()]
     for scenario in SCENARIOS:
-        driven = ("openings", "backstepping", *(["residual"] if scenario in shipped_names() else []))
+        driven = ("openings", "backstepping", *(["residual"] if scenario in names("policy") else []))
         chosen += [(scenario, "ideal", who) for who in driven]
         chosen += [(scenario, "lab", "admittance-backstepping")]
     return {f"{scenario}, {sensors}, {who}": (scenario, sensors, who) for scenario, sensors, who in dict.fromkeys(chosen)}

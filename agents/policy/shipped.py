@@ -1,0 +1,49 @@
+"""What is registered of trained policies: those that come with the package, and the controller that one of them makes.
+
+Nothing here needs the extra that policies need, so that lists are the same without it.
+"""
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from baselines.staged import StagedController
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import LAST, names, register
+
+SHIPPED = Path(__file__).resolve().parent.parent / "policies"
+"""Trained policies that come with the package, a folder per configuration and in it one per seed."""
+
+AGENTS = "extra agents"
+
+
+def loadable_names() -> list[str]:
+    """Registered policies; none where the extra is missing that reads them."""
+    return names("policy") if find_spec("safetensors") else []
+
+
+@register(
+    controller="residual",
+    about="A law with a trained policy that corrects it; residual:circle names the policy.",
+    needs={"force sensor", AGENTS},
+    listed=False,
+    order=LAST + 10,
+)
+def residual(parameters: Parameters, policy: Any = "circle", settings: Any = None) -> StagedController:
+    """``ResidualController``, which is imported here, late."""
+    from agents.policy.controller import ResidualController
+
+    return ResidualController(parameters, policy, settings)
+
+
+def _register(folder: Path) -> None:
+    """The policies of a folder of seeds, by what their training says."""
+    training = json.loads(next(folder.glob("seed_*/training.json")).read_text(encoding="utf-8"))["settings"]
+    needs = {AGENTS, "force sensor"} if training.get("force_sensor", True) else {AGENTS}
+    about = f"A law and a trained policy that corrects it: {folder.name}."
+    register(policy=folder.name, about=about, needs=needs)(folder)
+
+
+for _folder in sorted(SHIPPED.glob("*/")):
+    _register(_folder)
