@@ -35,7 +35,7 @@ class Controller(Protocol):
     def reset(self, lanes: Mask | None = None) -> None: ...
 
 
-Law = Callable[[Measurement, Reference], Array]
+CommandFunction = Callable[[Measurement, Reference], Array]
 """A function as a control law: openings as ``Controller.command`` returns them."""
 
 
@@ -45,10 +45,10 @@ ALLOWED = (
 )
 
 
-class PlainLaw:
+class PlainController:
     """A user's function of measurement and reference as a controller, which remembers nothing."""
 
-    def __init__(self, function: Law) -> None:
+    def __init__(self, function: CommandFunction) -> None:
         self.command = function
 
     def reset(self, lanes: Mask | None = None) -> None:
@@ -91,7 +91,7 @@ def controller_of(part: Any) -> Controller:
         made: Controller = part if arguments_of(part.reset).take(1) else WholeReset(part)
         return made
     if callable(part) and arguments_of(part).take(2):
-        return PlainLaw(part)
+        return PlainController(part)
     raise ValueError(f"controller = {shown(part)}; allowed: {ALLOWED}, which is called first")
 
 

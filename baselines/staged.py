@@ -104,7 +104,7 @@ def feedforward_rows(
 
 
 @dataclass(frozen=True)
-class LawStage:
+class ControllerStage:
     """A stage of a law: its function, its constants (C,), the memory (M,) of a lane that starts, and whether it reads an
     acceleration."""
 
@@ -115,7 +115,9 @@ class LawStage:
 
 
 class StagedController:
-    """A law that is compiled stages. A law derives from it, gives ``law_stages`` and says in ``explain`` what it refuses.
+    """A controller that is compiled stages.
+
+    It derives from this class, gives ``controller_stages`` and says in ``explain`` what it refuses.
 
     ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
     A sample that is not finite is replaced by the last good one (``birthsim_env.loop.guard``); ``missed`` counts the periods.
@@ -137,9 +139,9 @@ class StagedController:
         self.parameters = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
         self._lanes, self._sampled = 0, False
-        self._made: list[LawStage] = []
+        self._made: list[ControllerStage] = []
         self._memories: list[Array] = []
-        self._kept: Array = np.zeros((guard.Kept.size, 0))
+        self._kept: Array = np.zeros((guard.LastGood.size, 0))
         self._loop: MixedLoop | None = None
         self.protect()
 
@@ -178,20 +180,21 @@ class StagedController:
     @property
     def missed(self) -> NDArray[np.int64]:
         """Control periods since the start in which a signal that the law reads was replaced, (N,)."""
-        return guard.Kept(self._kept).missed.astype(np.int64)
+        return guard.LastGood(self._kept).missed.astype(np.int64)
 
     @property
     def ended(self) -> NDArray[np.bool_]:
         """Where a signal was missing for longer than ``fault_time``, so that the control has ended, (N,)."""
-        return guard.Kept(self._kept).ended > 0.0
+        return guard.LastGood(self._kept).ended > 0.0
 
     def is_compiled(self) -> bool:
         """Whether ``stages`` are all that ``command`` does: not where a derived class has changed it."""
         return getattr(self.command, "__func__", None) is StagedController.command
 
-    def law_stages(self, sampled: bool) -> Sequence[LawStage]:
+    def controller_stages(self, sampled: bool) -> Sequence[ControllerStage]:
         """The law for one kind of sensors: ``sampled`` where positions are samples, see ``Measurement``."""
-        raise NotImplementedError(f"{type(self).__name__}.law_stages(sampled) is missing; it returns LawStage objects")
+        name = f"{type(self).__name__}.controller_stages(sampled)"
+        raise NotImplementedError(f"{name} is missing; it returns ControllerStage objects")
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the ``ValueError`` for signals, over N lanes, that a stage of the law could not serve."""
@@ -205,7 +208,7 @@ class StagedController:
     def prepare(self, lanes: int, sampled: bool) -> None:
         """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
         if (lanes, sampled) != (self._lanes, self._sampled):
-            self._lanes, self._sampled, self._made, self._loop = lanes, sampled, list(self.law_stages(sampled)), None
+            self._lanes, self._sampled, self._made, self._loop = lanes, sampled, list(self.controller_stages(sampled)), None
             self._memories = [np.repeat(one.fresh[:, None], lanes, axis=1) for one in self._made]
             self._kept = np.repeat(guard.fresh(self.parameters)[:, None], lanes, axis=1)
             self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
@@ -226,9 +229,9 @@ class StagedController:
         reads = {*guard.SIGNALS} - {"user_force", "acceleration"}
         reads |= {"user_force"} if self.reads_force else set()
         reads |= {"acceleration"} if self._reads_acceleration() else set()
-        about = guard.limits(self.parameters, reads, self._on_fault, self._fault_time)
-        first = Stage(guard.let_pass, about, self._kept, sees_world=False)
-        return [first, *self.inner_stages(), Stage(guard.end, about, sees_world=False)]
+        constants = guard.limits(self.parameters, reads, self._on_fault, self._fault_time)
+        first = Stage(guard.let_pass, constants, self._kept, sees_world=False)
+        return [first, *self.inner_stages(), Stage(guard.end, constants, sees_world=False)]
 
     def _reads_acceleration(self) -> bool:
         return any(one.reads_acceleration for one in self._made)

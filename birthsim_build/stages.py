@@ -189,21 +189,21 @@ class Period(Numbers):
 
 
 @kernel
-def enter_sensors(world: World, seen: Seen, inputs: Inputs, about: Period, tables: int, lane: int, n: int) -> int:
+def enter_sensors(world: World, seen: Seen, inputs: Inputs, constants: Period, tables: int, lane: int, n: int) -> int:
     """The clock shows the time since these sensors were put in place, until ``leave_sensors`` puts it back."""
     for i in range(n):
         inputs.clock[i] = seen.time[i]
         world.tick[i] -= inputs.sensors_begin[i]
-        seen.time[i] = world.tick[i] * about.period
-        seen.position_time[i] -= inputs.sensors_begin[i] * about.period
+        seen.time[i] = world.tick[i] * constants.period
+        seen.position_time[i] -= inputs.sensors_begin[i] * constants.period
     return 0
 
 
 @kernel
-def leave_sensors(world: World, seen: Seen, inputs: Inputs, about: Period, tables: int, lane: int, n: int) -> int:
+def leave_sensors(world: World, seen: Seen, inputs: Inputs, constants: Period, tables: int, lane: int, n: int) -> int:
     """The clock is that of the loop again."""
     for i in range(n):
         world.tick[i] += inputs.sensors_begin[i]
         seen.time[i] = inputs.clock[i]
-        seen.position_time[i] += inputs.sensors_begin[i] * about.period
+        seen.position_time[i] += inputs.sensors_begin[i] * constants.period
     return 0

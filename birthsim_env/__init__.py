@@ -10,7 +10,7 @@ from birthsim_env.gradients.linear.linearize import balanced_pressures, lineariz
 from birthsim_env.gradients.linear.model import LinearModel
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
-from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
+from birthsim_env.parts.references import Circle, FixedTarget, Path, Trajectory
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.plant import Plant
@@ -18,7 +18,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import normalized_score, reference_scores
 
 __all__ = [
-    "Circle", "ForceProfile", "Hold", "LinearModel", "Measurement", "Parameters", "Path", "Plant", "Reference",
+    "Circle", "FixedTarget", "ForceProfile", "LinearModel", "Measurement", "Parameters", "Path", "Plant", "Reference",
     "StiffnessSchedule", "Trajectory", "UserForce", "balanced_pressures", "linearize", "linearize_lanes",
     "normalized_score", "reference_scores",
 ]  # fmt: skip

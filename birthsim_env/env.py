@@ -173,14 +173,13 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One policy step."""
         episodes = self._episodes
-        paid, failed = episodes.step(episodes.columns([action]))
-        terminated = bool(failed[0])
+        reward_terms, (terminated,) = episodes.step(episodes.columns([action]))
         truncated = not terminated and bool(episodes.elapsed[0] >= self.steps)
         info: dict[str, Any] = single_info(episodes.describe())
-        info.update(zip(REWARD_TERMS, paid[:-1, 0], strict=True))
+        info.update(zip(REWARD_TERMS, reward_terms[:-1, 0], strict=True))
         info["is_success"] = bool(episodes.success[0])
         self._render_human()
-        return episodes.observation()[0], float(paid[-1, 0]), terminated, truncated, info
+        return episodes.observation()[0], float(reward_terms[-1, 0]), bool(terminated), truncated, info
 
     def render(self) -> Any:
         """A frame (height, width, 3), uint8, in mode ``rgb_array``."""

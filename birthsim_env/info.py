@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from birthsim_env.loop.rows import Signals, World
-from birthsim_env.loop.signals import given_way
+from birthsim_env.loop.signals import compliant_offset
 from birthsim_env.physics import control_model, dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -53,7 +53,7 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
     reference, motion = seen.reference, world.motion
     for i in range(n):
         info.time[i], info.since_jump[i] = seen.time[i], world.since_jump[i]
-        given = given_way(reference, world.force[0, i], world.force[1, i], i)
+        given = compliant_offset(reference, world.force[0, i], world.force[1, i], i)
         for k in range(2):
             compliant = reference.position[k, i] + given[k]
             info.position[k, i], info.velocity[k, i] = motion.position[k, i], motion.velocity[k, i]

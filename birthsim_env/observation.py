@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import Signals, fill_measurement
-from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, given_way
+from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, compliant_offset
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
@@ -71,7 +71,7 @@ def look(seen: Signals, action: Array, shown: Array, p: Rig, scales: Array, out:
         half1, half2 = p.half_l1, p.half_l2
         edge1, edge2 = 0.02 * half1, 0.02 * half2
         fx, fy = seen.user_force[0, i], seen.user_force[1, i]
-        given = given_way(reference, fx, fy, i)
+        given = compliant_offset(reference, fx, fy, i)
         for axis in range(2):
             own.error[axis] = seen.position[axis, i] - reference.position[axis, i] - given[axis]
             own.velocity[axis] = seen.velocity[axis, i]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from birthsim_env import info, observation, reward
 from birthsim_env.loop.rows import Seen, World
-from birthsim_env.loop.signals import Mask, given_way
+from birthsim_env.loop.signals import Mask, compliant_offset
 from birthsim_env.loop.stage import Stage, block, singles, table2
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.compilation import kernel
@@ -18,7 +18,7 @@ from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, r
 class Memory(Rows):
     """What is carried from one policy step to the next."""
 
-    owed = part(reward.Owed, "for the reward")
+    target_lag = part(reward.TargetLag, "for the reward")
     tally = part(reward.Tally, "for success")
     fresh = row("1", "1 where an episode begins")
     air = row("kg", "drawn from the supply")
@@ -28,11 +28,11 @@ class Memory(Rows):
 class Ends(Rows):
     """How episodes are doing."""
 
-    failed = row("1", "1 where the lane has left the physical range")
+    terminated = row("1", "1 where the lane has left the physical range")
     success = row("1", "1 where the episode is successful so far")
 
 
-class About(Numbers):
+class Constants(Numbers):
     """Constants of the stage."""
 
     stepped = number("1", "1 after a step, 0 where episodes begin")
@@ -44,30 +44,30 @@ class About(Numbers):
 
 
 @kernel
-def _close(world: World, seen: Seen, memory: int, about: About, tables: int, lane: int, n: int) -> int:
-    size, mine, reference = int(about.actions), slice(lane, lane + n), seen.reference
+def _close(world: World, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
+    size, mine, reference = int(constants.actions), slice(lane, lane + n), seen.reference
     own, ends = Memory(block(memory, Memory.size + size)), Ends(table2(tables, 1)[:, mine])
     told = info.Info(table2(tables, 2)[:, mine])
     action = seen.action[:size]
-    if about.stepped > 0.0:
+    if constants.stepped > 0.0:
         terms = reward.Terms(table2(tables, 0)[:, mine])
-        reward.assess(world, reference, own.owed, action, own.action, about.limits, terms, ends.failed, n)
-        reward.add(world, reference, ends.failed, own.tally, ends.success, n)
+        reward.assess(world, reference, own.target_lag, action, own.action, constants.limits, terms, ends.terminated, n)
+        reward.add(world, reference, ends.terminated, own.tally, ends.success, n)
         dynamics.copy(action, own.action, n)
     else:
         for i in range(n):
             if own.fresh[i] > 0.0:
                 # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
-                given = given_way(reference, world.force[0, i], world.force[1, i], i)
+                offset = compliant_offset(reference, world.force[0, i], world.force[1, i], i)
                 for axis in range(2):
-                    own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
-                own.fresh[i], ends.failed[i], ends.success[i] = 0.0, 0.0, 0.0
+                    own.target_lag.offset[axis, i], own.target_lag.remaining[axis, i] = offset[axis], offset[axis]
+                own.fresh[i], ends.terminated[i], ends.success[i] = 0.0, 0.0, 0.0
     info.describe(world, seen, told, n)
     for i in range(n):
-        own.air[i] += told.supply_flow[i] * (about.limits.period * about.stepped)
+        own.air[i] += told.supply_flow[i] * (constants.limits.period * constants.stepped)
         told.air_used[i] = own.air[i]
-    shown = seen.shown[: int(about.shown)]
-    observation.look(seen, own.action, shown, about.rig, about.scales, singles(tables, 3)[mine], n)
+    shown = seen.shown[: int(constants.shown)]
+    observation.look(seen, own.action, shown, constants.rig, constants.scales, singles(tables, 3)[mine], n)
     return 0
 
 
@@ -92,7 +92,9 @@ class Outcome:
             period=policy_period, jumped_below=policy_period - 0.5 * period, impact_speed=impact_speed
         )
         self._constants = [
-            About.numbers(stepped=stepped, limits=limits, actions=actions, shown=shown, rig=nominal, scales=observation.SCALES)
+            Constants.numbers(
+                stepped=stepped, limits=limits, actions=actions, shown=shown, rig=nominal, scales=observation.SCALES
+            )
             for stepped in (False, True)
         ]
 

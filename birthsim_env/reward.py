@@ -11,7 +11,7 @@ haste, and rigs near their limit do not return from an overshoot.
 import math
 
 from birthsim_env.loop.rows import World
-from birthsim_env.loop.signals import Reference, given_way
+from birthsim_env.loop.signals import Reference, compliant_offset
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -67,11 +67,11 @@ class Terms(Rows):
 REWARD_TERMS = tuple(name for name, *_ in Terms.entries())[:-1]
 
 
-class Owed(Rows):
+class TargetLag(Rows):
     """What a policy step has to know of the ones before."""
 
-    given = rows("x y", "m", "what the hand has moved the compliant target by")
-    owed = rows("x y", "m", "how much of that is not asked for yet")
+    offset = rows("x y", "m", "what the hand has moved the compliant target by")
+    remaining = rows("x y", "m", "how much of that is not asked for yet")
 
 
 class Limits(Numbers):
@@ -95,33 +95,33 @@ class Tally(Rows):
 def assess(
     world: World,
     reference: Reference,
-    owed: Owed,
+    lag: TargetLag,
     action: Array,
     last_action: Array,
     limits: Limits,
     terms: Terms,
-    failed: Array,
+    terminated: Array,
     n: int,
 ) -> None:
-    """Writes ``terms`` of n lanes, and 1 in lanes (N,) that have ``failed``: those that have left the physical range.
+    """Writes ``terms`` of n lanes, and 1 in ``terminated`` (N,) for lanes that have left the physical range.
 
-    ``owed`` is carried on. ``action`` and ``last_action`` (size, N).
+    ``lag`` is carried on. ``action`` and ``last_action`` (size, N).
     """
     steps, kept = limits.period / 0.01, exact.exp(-limits.period / GIVING_WAY)
     unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
     state = world.state
     for i in range(n):
-        given = given_way(reference, world.force[0, i], world.force[1, i], i)
+        offset = compliant_offset(reference, world.force[0, i], world.force[1, i], i)
         jumped = world.since_jump[i] < limits.jumped_below
         error, speed = 0.0, 0.0
         for axis in range(2):
-            change = given[axis] - owed.given[axis, i]
-            due = kept * (owed.owed[axis, i] + (change if jumped else 0.0))
-            asked = given[axis] - due
-            rate = (asked - owed.given[axis, i] + owed.owed[axis, i]) / limits.period
+            change = offset[axis] - lag.offset[axis, i]
+            due = kept * (lag.remaining[axis, i] + (change if jumped else 0.0))
+            asked = offset[axis] - due
+            rate = (asked - lag.offset[axis, i] + lag.remaining[axis, i]) / limits.period
             error += abs(world.motion.position[axis, i] - reference.position[axis, i] - asked)
             speed += abs(world.motion.velocity[axis, i] - reference.velocity[axis, i] - rate)
-            owed.given[axis, i], owed.owed[axis, i] = given[axis], due
+            lag.offset[axis, i], lag.remaining[axis, i] = offset[axis], due
         cost = exact.log1p(min(FARTHEST, error) / ERROR_UNIT)
         hunting = exact.log1p(min(FASTEST, speed) / SPEED_UNIT)
         turned, effort = 0.0, 0.0
@@ -135,7 +135,7 @@ def assess(
         for k in (at.TP1, at.TN1, at.TP2, at.TN2):
             inside = inside and least_t < state[k, i] < most_t
         inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
-        failed[i] = 1.0 if not inside or max(world.impact[0, i], world.impact[1, i]) > limits.impact_speed else 0.0
+        terminated[i] = 1.0 if not inside or max(world.impact[0, i], world.impact[1, i]) > limits.impact_speed else 0.0
         terms.survive[i] = steps
         terms.tracking[i] = -unit * cost
         terms.hunting[i] = -unit * HUNTING_COST * hunting
@@ -145,16 +145,16 @@ def assess(
 
 
 @helper
-def add(world: World, reference: Reference, failed: Array, tally: Tally, success: Array, n: int) -> None:
+def add(world: World, reference: Reference, terminated: Array, tally: Tally, success: Array, n: int) -> None:
     """Takes one policy step: carries ``tally`` on and writes ``success`` (N,), 1 where an episode is successful so far.
 
     The error is the root mean square over the policy steps ``SETTLED`` s and more after a jump, or over all of them before
-    there is such a step. An episode that has ``failed`` (N,) is none.
+    there is such a step. An episode that has ``terminated`` (N,) is not successful.
     """
     for i in range(n):
-        given_x, given_y = given_way(reference, world.force[0, i], world.force[1, i], i)
-        x = world.motion.position[0, i] - reference.position[0, i] - given_x
-        y = world.motion.position[1, i] - reference.position[1, i] - given_y
+        offset_x, offset_y = compliant_offset(reference, world.force[0, i], world.force[1, i], i)
+        x = world.motion.position[0, i] - reference.position[0, i] - offset_x
+        y = world.motion.position[1, i] - reference.position[1, i] - offset_y
         tally.squares[i] += x * x + y * y
         tally.steps[i] += 1.0
         if world.since_jump[i] >= SETTLED:
@@ -163,4 +163,4 @@ def add(world: World, reference: Reference, failed: Array, tally: Tally, success
         any_settled = tally.settled_steps[i] > 0.0
         squares = tally.settled_squares[i] if any_settled else tally.squares[i]
         steps = tally.settled_steps[i] if any_settled else tally.steps[i]
-        success[i] = 1.0 if failed[i] == 0.0 and math.sqrt(squares / steps) < SUCCESS_ERROR else 0.0
+        success[i] = 1.0 if terminated[i] == 0.0 and math.sqrt(squares / steps) < SUCCESS_ERROR else 0.0

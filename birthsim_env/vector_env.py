@@ -133,13 +133,13 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             raise ValueError(
                 f"lanes {np.flatnonzero(self._ended).tolist()} have ended; allowed: reset(options={{'reset_mask': ...}})"
             )
-        paid, terminated = episodes.step(episodes.columns(actions))
+        reward_terms, terminated = episodes.step(episodes.columns(actions))
         if self._ended.any():
             # They have begun when they ended, so that nothing that is lost is integrated further; their first step is undone.
             episodes.begin(self._ended, again=True)
-            paid[:, self._ended] = 0.0
+            reward_terms[:, self._ended] = 0.0
             terminated = terminated & ~self._ended
-        rewards, terms = paid[-1], dict(zip(REWARD_TERMS, paid, strict=False))
+        rewards, terms = reward_terms[-1], dict(zip(REWARD_TERMS, reward_terms, strict=False))
         truncated = (episodes.elapsed >= self.steps) & ~terminated
         observation = episodes.observation()
         infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms, "is_success": episodes.success}

@@ -153,7 +153,7 @@ def _batch(environment: str, level: str, seeds: list[int]) -> Iterator[Recorded]
     name, generators = LEVELS[level], [np.random.default_rng([seed, 1]) for seed in seeds]
     law = name and make_controller(name, Parameters().replace({"electronics.control_period": PERIOD}))
     seen: list[Any] = [env.reset(seed=seeds)[0]]
-    acted, paid, terminated, over = list[Any](), list[Any](), list[Any](), list[Any]()
+    acted, rewards, terminated, over = list[Any](), list[Any](), list[Any](), list[Any]()
     for _ in range(env.steps):
         if law:
             action = np.array(law.command(env.measurement, env.reference)).T
@@ -162,11 +162,11 @@ def _batch(environment: str, level: str, seeds: list[int]) -> Iterator[Recorded]
         else:
             action = np.array([generator.uniform(-1.0, 1.0, env.single_action_space.shape) for generator in generators])
         acted.append(np.clip(action, -1.0, 1.0).astype(np.float32))
-        observation, reward, fallen, cut, _ = env.step(acted[-1])
-        for kept, one in ((seen, observation), (paid, reward), (terminated, fallen), (over, fallen | cut)):
+        observation, reward, terminated_now, cut, _ = env.step(acted[-1])
+        for kept, one in ((seen, observation), (rewards, reward), (terminated, terminated_now), (over, terminated_now | cut)):
             kept.append(one)
-        if law and fallen.any():
-            law.reset(fallen)
+        if law and terminated_now.any():
+            law.reset(terminated_now)
     env.close()
     # A lane that has ended goes on with another episode, which nobody asked for.
     for lane, (seed, steps) in enumerate(zip(seeds, np.argmax(over, axis=0) + 1, strict=True)):
@@ -174,7 +174,7 @@ def _batch(environment: str, level: str, seeds: list[int]) -> Iterator[Recorded]
             seed,
             np.array(seen)[: steps + 1, lane],
             np.array(acted)[:steps, lane],
-            np.array(paid)[:steps, lane],
+            np.array(rewards)[:steps, lane],
             bool(terminated[steps - 1][lane]),
         )
 

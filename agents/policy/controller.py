@@ -11,7 +11,7 @@ from agents.policy.files import load_policy
 from agents.policy.network import PolicyNetwork
 from agents.policy.seeds import best_policy
 from agents.policy.stage import policy_stage
-from agents.residual.law import ResidualLaw, memory_names, observation_names
+from agents.residual.corrected import CorrectedController, memory_names, observation_names
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import policy_periods
 from birthsim_env.loop.signals import Mask
@@ -27,7 +27,7 @@ One that remembers also has ``reset(lanes)``, which forgets the past of all lane
 True."""
 
 
-class ResidualController(ResidualLaw):
+class ResidualController(CorrectedController):
     """The law with a policy on top: the policy is asked every policy period, the law at every call.
 
     ``policy`` is a folder that ``birthsim train`` wrote, or the name of a policy that comes with the package. Of several

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from agents.policy.files import Policy
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork, Weights
-from agents.residual.law import action_names, observation_names
+from agents.residual.corrected import action_names, observation_names
 from birthsim_env.files import whole_file
 from birthsim_env.observation import LIMIT
 

@@ -14,7 +14,7 @@ from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
-class About(Numbers):
+class Constants(Numbers):
     """Constants of the stage."""
 
     periods = number("1", "control periods of a policy step")
@@ -39,27 +39,27 @@ FIRST_TABLE = 2
 
 
 @kernel
-def decide(world: int, seen: Seen, memory: int, about: About, tables: int, lane: int, n: int) -> int:
+def decide(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Writes the action, once per policy step."""
-    cells = int(about.cells)
+    cells = int(constants.cells)
     kept = Memory(block(memory, Memory.size + cells))
     due = kept.left[0] == 0.0
     for i in range(n):
-        kept.left[i] = (about.periods if due else kept.left[i]) - 1.0
+        kept.left[i] = (constants.periods if due else kept.left[i]) - 1.0
     if not due:
         return 0
-    size, shown, mine = int(about.actions), int(about.shown), slice(lane, lane + n)
+    size, shown, mine = int(constants.actions), int(constants.shown), slice(lane, lane + n)
     observed, space = singles(tables, 0)[mine], table3(tables, 1)[:, mine]
-    look(seen, seen.action[:size], seen.shown[:shown], about.rig, about.scales, observed, n)
+    look(seen, seen.action[:size], seen.shown[:shown], constants.rig, constants.scales, observed, n)
     network, actions = tables + FIRST_TABLE * TABLE * 8, seen.action[:size, :n].T
-    answer(network, int(about.layers), about.squashed > 0.0, observed, space, kept.cells[:, :n].T, actions)
+    answer(network, int(constants.layers), constants.squashed > 0.0, observed, space, kept.cells[:, :n].T, actions)
     return 0
 
 
 def policy_stage(network: PolicyNetwork, periods: int, actions: int, shown: int, nominal: Array, lanes: int) -> Stage:
     """A network that is asked every ``periods`` control periods; the law shows ``shown`` rows of its memory, and its owner
     describes the rig as ``nominal`` (PARAMETERS,)."""
-    about = About.numbers(
+    constants = Constants.numbers(
         periods=periods,
         actions=actions,
         shown=shown,
@@ -71,4 +71,4 @@ def policy_stage(network: PolicyNetwork, periods: int, actions: int, shown: int,
     )
     observed: NDArray[Any] = np.zeros((lanes, network.inputs), dtype=np.float32)
     tables = (observed, network.room(lanes), *network.tables)
-    return Stage(decide, about, np.zeros((Memory.size + network.cells, lanes)), tables, sees_world=False)
+    return Stage(decide, constants, np.zeros((Memory.size + network.cells, lanes)), tables, sees_world=False)

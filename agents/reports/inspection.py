@@ -21,7 +21,7 @@ from baselines.controller import Controller
 from birthsim_env.loop.signals import displacement
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.hands.user_forces import ForceProfile
-from birthsim_env.parts.references import Circle, Hold, Trajectory
+from birthsim_env.parts.references import Circle, FixedTarget, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
@@ -90,7 +90,7 @@ def _follow(
 
 def weight_over_workspace(policy: Policy) -> tuple[Array, Array]:
     """Correction on cylinder 2 and m g cos(theta1), N, (PLACES,) each: held still, without friction, masses drawn at random."""
-    hold, rig = Hold(((0.40, 0.60), (-0.12, 0.08))), Parameters().replace(FRICTIONLESS)
+    hold, rig = FixedTarget(((0.40, 0.60), (-0.12, 0.08))), Parameters().replace(FRICTIONLESS)
     env, taken = _follow(policy.network.acting(), policy.settings, PLACES, 3.0, hold, {"mechanics.mass": MASSES}, rig)
     mass = env.simulation.plant.lane_parameters[at.MASS]
     angle = theta1(taken["piston_position"][-1, :, 0], rig)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from agents.residual.law import ResidualActuation
+from agents.residual.corrected import ResidualActuation
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import refuse_unknown
 from birthsim_env.env import BirthSIMEnv
@@ -10,7 +10,7 @@ from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 
-class _LawInside:
+class _InnerController:
     """Puts the law between the policy and the valves of the environment that it is mixed into."""
 
     def __init__(self, scenario: str, **arguments: Any) -> None:
@@ -26,7 +26,7 @@ class _LawInside:
         super().__init__(scenario, parameters=rig, actuation=ResidualActuation(rig, settings), **arguments)  # type: ignore[call-arg]
 
 
-class ResidualEnv(_LawInside, BirthSIMEnv):
+class ResidualEnv(_InnerController, BirthSIMEnv):
     """A scenario of ``BirthSIMEnv`` with a control law running inside at 1 kHz, which a policy corrects.
 
     ## Action space
@@ -48,7 +48,7 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     That of `BirthSIMEnv`. After the last action follow three more groups. First the smoothed action. Then the fractions of the
     authority that are left; they fall where pistons oscillate. Last the forces on pistons 1 and 2 that the model does not
     explain, in units of 100 N: now, when the piston last moved out, and when it last moved in. An `informed` policy also sees
-    what the admittance controller would know (`agents.residual.insight`). `observation_names` lists all.
+    what the admittance controller would know (`agents.residual.features`). `observation_names` lists all.
 
     ## Reward, start, end and info
     Those of `BirthSIMEnv`.
@@ -64,5 +64,5 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     """
 
 
-class ResidualVectorEnv(_LawInside, BirthSIMVectorEnv):
+class ResidualVectorEnv(_InnerController, BirthSIMVectorEnv):
     """``ResidualEnv`` over N lanes in one kernel call per control period; see ``BirthSIMVectorEnv``."""

@@ -5,8 +5,8 @@ Its observer is given the hand's force. It never lets a piston rest: a residual 
 
 from agents.residual import unexplained
 from baselines.estimation import disturbance_observer, observers
-from baselines.estimation.rows import Belief, Given, Pistons
-from baselines.staged import LawStage
+from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
+from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.loop.stage import block, scratch
@@ -16,7 +16,7 @@ from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, r
 from birthsim_env.physics.rig.parameters import Parameters
 
 
-class Found(Rows):
+class ObservedPistons(Rows):
     """What is handed on."""
 
     joints = part(Joints, "measured or estimated")
@@ -27,20 +27,20 @@ class Sampled(Numbers):
     """Constants where positions are samples."""
 
     rows_of_memory = number("1", "rows of the observer")
-    belief = part(Belief, "of the observer")
+    model = part(AssumedParameters, "of the observer")
 
 
 @helper
-def _given(force: Array, about: Belief, given: Given, n: int) -> None:
-    """Writes what the observer is ``given``, with the hand's ``force`` (2, n), N."""
+def _fill_inputs(force: Array, assumed: AssumedParameters, inputs: Inputs, n: int) -> None:
+    """Writes the observer's ``inputs``, with the hand's ``force`` (2, n), N."""
     for i in range(n):
         for k in range(2):
-            given.force[k, i], given.believed[k, i] = force[k, i], 0.0
-        given.moving[i], given.noise[i], given.inverse_mass[i] = 1.0, about.noise, about.rig.inverse_mass
+            inputs.force[k, i], inputs.believed[k, i] = force[k, i], 0.0
+        inputs.moving[i], inputs.noise[i], inputs.inverse_mass[i] = 1.0, assumed.noise, assumed.rig.inverse_mass
 
 
 @helper
-def _hand_on(pistons: Pistons, found: Found, n: int) -> None:
+def _hand_on(pistons: Pistons, found: ObservedPistons, n: int) -> None:
     """Writes the disturbance."""
     for i in range(n):
         for k in range(2):
@@ -48,23 +48,26 @@ def _hand_on(pistons: Pistons, found: Found, n: int) -> None:
 
 
 @kernel
-def _measure(world: int, seen: Seen, pistons: Pistons, about: Belief, tables: int, lane: int, n: int) -> int:
+def _measure(world: int, seen: Seen, pistons: Pistons, assumed: AssumedParameters, tables: int, lane: int, n: int) -> int:
     """Where positions and speeds are measured."""
-    given, found = Given(scratch(Given.size)), Found(seen.handed[: Found.size])
-    _given(seen.user_force, about, given, n)
+    inputs, found = Inputs(scratch(Inputs.size)), ObservedPistons(seen.intermediate[: ObservedPistons.size])
+    _fill_inputs(seen.user_force, assumed, inputs, n)
     point = Point(seen.rows[POSITION : POSITION + Point.size])
-    disturbance_observer.observe(pistons, point, seen.pressure, given, about, found.joints, n)
+    disturbance_observer.observe(pistons, point, seen.pressure, inputs, assumed, found.joints, n)
     _hand_on(pistons, found, n)
     return 0
 
 
 @kernel
-def _observe(world: int, seen: Seen, memory: int, about: Sampled, tables: int, lane: int, n: int) -> int:
+def _observe(world: int, seen: Seen, memory: int, constants: Sampled, tables: int, lane: int, n: int) -> int:
     """Where positions are samples."""
-    signals, given = Seen(seen.rows[:, :n]), Given(scratch(Given.size))
-    pistons, found = Pistons(block(memory, int(about.rows_of_memory))[:, :n]), Found(signals.handed[: Found.size])
-    _given(signals.user_force, about.belief, given, n)
-    observers.observe(pistons, signals, signals.pressure, given, about.belief)
+    signals, inputs = Seen(seen.rows[:, :n]), Inputs(scratch(Inputs.size))
+    pistons, found = (
+        Pistons(block(memory, int(constants.rows_of_memory))[:, :n]),
+        ObservedPistons(signals.intermediate[: ObservedPistons.size]),
+    )
+    _fill_inputs(signals.user_force, constants.model, inputs, n)
+    observers.observe(pistons, signals, signals.pressure, inputs, constants.model)
     for i in range(n):
         for k in range(2):
             found.joints.position[k, i], found.joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
@@ -72,10 +75,10 @@ def _observe(world: int, seen: Seen, memory: int, about: Sampled, tables: int, l
     return 0
 
 
-def observed(rig: Parameters, sampled: bool) -> LawStage:
+def observed(rig: Parameters, sampled: bool) -> ControllerStage:
     """Finds joints and disturbance."""
     fresh = observers.fresh_memory(rig, sampled)
     if not sampled:
-        return LawStage(_measure, observers.belief(rig, unexplained.BANDWIDTH), fresh)
-    belief = observers.belief(rig, observers.BANDWIDTH)
-    return LawStage(_observe, Sampled.numbers(rows_of_memory=len(fresh), belief=belief), fresh)
+        return ControllerStage(_measure, observers.assumed_parameters(rig, unexplained.BANDWIDTH), fresh)
+    assumed = observers.assumed_parameters(rig, observers.BANDWIDTH)
+    return ControllerStage(_observe, Sampled.numbers(rows_of_memory=len(fresh), model=assumed), fresh)

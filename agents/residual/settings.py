@@ -48,7 +48,7 @@ class ResidualSettings:
     - ``policy_period`` (s).
     - ``force_sensor``: without one, neither a law that ``needs_force`` nor an impedance that varies, which needs the hand's
       force.
-    - ``informed``: the policy also observes ``agents.residual.insight``.
+    - ``informed``: the policy also observes ``agents.residual.features``.
 
     Raises ``ValueError`` for values outside these limits.
     """

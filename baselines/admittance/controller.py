@@ -12,15 +12,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import knowledge, law
+from baselines.admittance import estimator, law
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, checked_gains, require_stiffness
 from baselines.estimation import inertial
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Impedance, mass_spring_damper
-from baselines.staged import LawStage, StagedController
-from birthsim_env.loop.rows import HANDED, POSITION
+from baselines.staged import ControllerStage, StagedController
+from birthsim_env.loop.rows import INTERMEDIATE, POSITION
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array
@@ -165,7 +165,7 @@ class AdmittanceController(StagedController):
         """The mass, damper and spring of the admittance, over N lanes."""
         return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         rig, noisy = self.parameters, sampled
         board, learns_force = rig.electronics, self._learn and self._force_sensor
         fixed = self._force_sensor and not self._learn
@@ -180,24 +180,24 @@ class AdmittanceController(StagedController):
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
         follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
-        about = knowledge.beliefs(
+        parameters = estimator.estimator_parameters(
             rig,
             sampled,
             noisy,
             g,
             force_sensor=self._force_sensor,
             learns_noise=(sampled and self._learn) or weighed,
-            place=HANDED if inert else POSITION,
+            place=INTERMEDIATE if inert else POSITION,
             friction_rate=g["friction_rate"] if learns_force else 0.0,
             identified=self._identified,
             learns_mass=sampled and learns_force,
             weighed=weighed,
-            believed_limit=knowledge.BELIEVED_LIMIT if inert or fixed else knowledge.BELIEVED_HAND,
+            believed_limit=estimator.BELIEVED_LIMIT if inert or fixed else estimator.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )
-        constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
-        own = LawStage(law.control, constants, knowledge.fresh_memory(rig, sampled))
-        return [inertial.law_stage(rig), own] if inert else [own]
+        constants = Constants.numbers(**parameters, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
+        own = ControllerStage(law.control, constants, estimator.fresh_memory(rig, sampled))
+        return [inertial.controller_stage(rig), own] if inert else [own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         require_stiffness(reference, 0.0)

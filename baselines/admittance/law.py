@@ -3,23 +3,23 @@
 The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
     j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
     L_i = F_i - Fext_i - Fv v_i + unseen_i
-with the forces unseen of ``knowledge``: believed friction and what an observer finds besides.
+with the forces unseen of ``estimator``: believed friction and what an observer finds besides.
 
 - While pistons rest (``observers``) position errors weigh ``rest_push`` times as much, since stiction, not inertia, has to be
   overcome, and those within ``dead_zone`` move nothing. Once the reference rests the loop has a gain of its own, softer: what
   noise a slow average leaves must not wear the friction down.
-- ``watch`` lowers c across or along cylinder 2 where the loop oscillates in that direction: the rig is then slower, lighter
-  or held more stiffly than believed.
-- ``calm`` lowers c for a while where the loop swings at rest, if nothing but friction tells the law of the hand.
+- ``gain_fraction`` lowers c across or along cylinder 2 where the loop oscillates in that direction: the rig is then slower,
+  lighter or held more stiffly than believed.
+- ``rest_gain_fraction`` lowers c for a while where the loop swings at rest, if nothing but friction tells the law of the hand.
 - Position errors count up to ``MOST_ERROR``, so that the loop comes back calmly from a load that was beyond its strength.
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
-from baselines.admittance import knowledge
-from baselines.admittance.rows import Constants, Follower, Gains, Known, Memory, Watch
+from baselines.admittance import estimator
+from baselines.admittance.rows import Constants, Estimate, Follower, Gains, Memory, OscillationDetector
 from baselines.backstepping.cartesian_law import across, along, load_rates
 from baselines.estimation.hand.half_wave import sustained
-from baselines.estimation.rows import Belief
+from baselines.estimation.rows import AssumedParameters
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Motion
@@ -32,7 +32,7 @@ from birthsim_env.physics.dynamics import load
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
 
-LEAST_CALM, CALMED, CALM_TIME = 0.55, 0.85, 0.4
+LEAST_REST_FRACTION, REST_REDUCTION, RECOVERY_TIME = 0.55, 0.85, 0.4
 """What is left of the gain of a loop that swings while its motion goes nowhere, at least and after each half wave, and s until
 it is back. Found by trial: without a force sensor a stiff hand makes a resting head swing at 14 Hz, and friction ends that."""
 
@@ -45,28 +45,28 @@ a speed of c MOST_ERROR/3, which saturated valves can still stop; else the loop 
 
 
 @helper
-def watch(watched: Watch, i: int, error: float, period: float, gains: Gains) -> float:
+def gain_fraction(detector: OscillationDetector, i: int, error: float, period: float, gains: Gains) -> float:
     """Gain fraction, lowered by each sustained half wave of a speed error: once for each whole ``oscillation`` of its size."""
-    fraction: float = watched.fraction[i]
-    peak = sustained(watched, i, error, period, gains.oscillation, 0.0)
+    fraction: float = detector.fraction[i]
+    peak = sustained(detector, i, error, period, gains.oscillation, 0.0)
     for _ in range(int(min(peak / gains.oscillation, gains.most_falls))):
         fraction = max(gains.least_fraction, gains.yielding * fraction)
-    watched.fraction[i] = fraction
+    detector.fraction[i] = fraction
     return fraction
 
 
 @helper
-def calm(watched: Watch, i: int, error: float, period: float, gains: Gains) -> float:
+def rest_gain_fraction(detector: OscillationDetector, i: int, error: float, period: float, gains: Gains) -> float:
     """Gain fraction, lowered by each sustained half wave of a speed error beyond ``swing``, which comes back."""
-    fraction: float = watched.fraction[i] + period / CALM_TIME * (1.0 - watched.fraction[i])
-    if sustained(watched, i, error, period, gains.swing, 0.0) > 0.0:
-        fraction = max(LEAST_CALM, CALMED * fraction)
-    watched.fraction[i] = fraction
+    fraction: float = detector.fraction[i] + period / RECOVERY_TIME * (1.0 - detector.fraction[i])
+    if sustained(detector, i, error, period, gains.swing, 0.0) > 0.0:
+        fraction = max(LEAST_REST_FRACTION, REST_REDUCTION * fraction)
+    detector.fraction[i] = fraction
     return fraction
 
 
 @helper
-def going(follower: Follower, i: int, motion: Motion, period: float) -> float:
+def motion_fraction(follower: Follower, i: int, motion: Motion, period: float) -> float:
     """How far the motion of lane ``i`` goes anywhere, 0 to 1."""
     square = 0.0
     for axis in range(2):
@@ -97,10 +97,10 @@ def beyond(error: float, zone: float) -> float:
 
 
 @helper
-def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belief) -> None:
+def command(seen: Seen, memory: Memory, estimate: Estimate, gains: Gains, assumed: AssumedParameters) -> None:
     """Writes the openings to ``seen`` and carries ``memory.follower`` on by one period."""
-    p, period, motion = about.rig, about.period, known.motion
-    hand, asked = known.given.force, seen.asked
+    p, period, motion = assumed.rig, assumed.period, estimate.motion
+    hand, asked = estimate.inputs.force, seen.asked
     feedforward, joints = seen.feedforward, memory.joints
     pressure, follower = memory.chambers.pressure, memory.follower
     kept, rest, c4 = exact.exp(-period / p.tau), memory.pistons.rest, gains.pneumatic_gain
@@ -109,7 +109,7 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         v1, v2 = joints.speed[0, i], joints.speed[1, i]
         pp1, pn1 = pressure[0, i], pressure[1, i]
         pp2, pn2 = pressure[2, i], pressure[3, i]
-        inverse_mass = known.given.inverse_mass[i]
+        inverse_mass = estimate.inputs.inverse_mass[i]
         m, gravity, atmosphere = memory.inertia.mass[i], p.gravity, p.atmosphere
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
             y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
@@ -118,8 +118,8 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
         load1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, atmosphere) - p.fv1 * v1
         load2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, atmosphere) - p.fv2 * v2
-        load1 = load1 + known.unseen[0, i] + feedforward.force[0, i]
-        load2 = load2 + known.unseen[1, i] + feedforward.force[1, i]
+        load1 = load1 + estimate.unseen[0, i] + feedforward.force[0, i]
+        load2 = load2 + estimate.unseen[1, i] + feedforward.force[1, i]
 
         # Across (t) and along (n) cylinder 2: errors of position, speed and acceleration.
         ex, ey = r2 * sine - motion.position[0, i], -r2 * cosine - motion.position[1, i]
@@ -132,14 +132,14 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         at_ = (push_t - load1 / kappa) / m - gravity * sine - across(ax, ay, sine, cosine)
         an_ = (push_n + load2) / m + gravity * cosine - along(ax, ay, sine, cosine)
 
-        fraction_t = watch(follower.across, i, dt, period, gains)
-        fraction_n = watch(follower.along, i, dn, period, gains)
-        follower.moved[i] = max(known.given.moving[i], follower.moved[i] * exact.exp(-period / MOTION_TIME))
+        fraction_t = gain_fraction(follower.across, i, dt, period, gains)
+        fraction_n = gain_fraction(follower.along, i, dn, period, gains)
+        follower.moved[i] = max(estimate.inputs.moving[i], follower.moved[i] * exact.exp(-period / MOTION_TIME))
         c = gains.rest_gain + (gains.gain - gains.rest_gain) * follower.moved[i]
         if gains.swing > 0.0:
-            gone = going(follower, i, motion, period)
-            fraction_t *= gone + (1.0 - gone) * calm(follower.calm_across, i, dt, period, gains)
-            fraction_n *= gone + (1.0 - gone) * calm(follower.calm_along, i, dn, period, gains)
+            gone = motion_fraction(follower, i, motion, period)
+            fraction_t *= gone + (1.0 - gone) * rest_gain_fraction(follower.rest_across, i, dt, period, gains)
+            fraction_n *= gone + (1.0 - gone) * rest_gain_fraction(follower.rest_along, i, dn, period, gains)
         et = (1.0 + (gains.rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * gains.dead_zone)
         en = (1.0 + (gains.rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * gains.dead_zone)
         et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))
@@ -160,11 +160,11 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
 
 
 @kernel
-def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are not positive definite."""
-    signals, known = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n])
-    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
-    missed = knowledge.know(signals, own, known, about)
-    command(signals, own, known, about.gains, about.belief)
+    signals, estimate = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n])
+    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
+    missed = estimator.estimate(signals, own, estimate, constants)
+    command(signals, own, estimate, constants.gains, constants.model)
     load(signals.opening, 0, n, own.chambers.opening)
     return missed

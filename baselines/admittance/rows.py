@@ -3,18 +3,18 @@
 from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.hand.bristle_observer import Felt
+from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.force_observer import Hand
 from baselines.estimation.hand.half_wave import HalfWave
-from baselines.estimation.hand.held_force import Hold
+from baselines.estimation.hand.held_force import RestDetector
 from baselines.estimation.inertia import Inertia
-from baselines.estimation.rows import Belief, Given, Pistons
+from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
-class Watch(HalfWave):
+class OscillationDetector(HalfWave):
     """Oscillation in one direction."""
 
     fraction = row("1", "fraction of the gain that oscillations have left; 1 at a new start")
@@ -23,10 +23,10 @@ class Watch(HalfWave):
 class Follower(Rows):
     """What the loop that follows the motion remembers."""
 
-    across = part(Watch, "across cylinder 2")
-    along = part(Watch, "along cylinder 2")
-    calm_across = part(Watch, "across cylinder 2, at rest")
-    calm_along = part(Watch, "along cylinder 2, at rest")
+    across = part(OscillationDetector, "across cylinder 2")
+    along = part(OscillationDetector, "along cylinder 2")
+    rest_across = part(OscillationDetector, "across cylinder 2, at rest")
+    rest_along = part(OscillationDetector, "along cylinder 2, at rest")
     drift = rows("vx vy", "m/s", "low-passed velocity of the motion")
     moved = row("1", "how far the motion was moving of late, 0 to 1")
 
@@ -44,27 +44,27 @@ class Memory(Rows):
     friction = part(Friction, "level of friction")
     inertia = part(Inertia, "mass")
     hand = part(Hand, "force of the hand without a sensor")
-    felt = part(Felt, "the same where friction is known")
-    hold = part(Hold, "whether the head rests, without a force sensor")
+    contact = part(ContactForce, "the same where friction is known")
+    rest_detector = part(RestDetector, "whether the head rests, without a force sensor")
     follower = part(Follower, "loop")
     pistons = part(Pistons, "observer")
 
 
-class Known(Rows):
+class Estimate(Rows):
     """What the law knows at one instant, besides what it remembers."""
 
     motion = part(Motion, "motion that the hand should find")
-    given = part(Given, "to the observer of the pistons")
+    inputs = part(Inputs, "to the observer of the pistons")
     unseen = rows("U1 U2", "N", "all that is unseen along the pistons: friction as believed and what is observed besides")
     drag = rows("drag1 drag2", "N", "friction along the motion, as believed of the rig")
     unexplained = rows("R1 R2", "N", "what pressures, weight, motion and measured force leave unexplained along the pistons")
     hand = rows("Fx Fy", "N", "force of the hand, measured or found")
 
 
-class Beliefs(Numbers):
+class EstimatorParameters(Numbers):
     """What the law believes of rig and sensors, and what it is to learn of them."""
 
-    belief = part(Belief, "of the observer of the pistons")
+    model = part(AssumedParameters, "of the observer of the pistons")
     compliance = part(Compliance, "what gives way")
     sampled = number("1", "1 where positions are samples")
     force_sensor = number("1", "1 with a force sensor")
@@ -97,7 +97,7 @@ class Gains(Numbers):
     most_falls = number("1", "times that a half wave lowers c at most: one n times ``oscillation`` lowers it n times")
 
 
-class Constants(Beliefs):
+class Constants(EstimatorParameters):
     """Constants of the stage."""
 
     gains = part(Gains, "of the loop")

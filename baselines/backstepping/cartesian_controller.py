@@ -12,7 +12,7 @@ from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import require_stiffness
 from baselines.estimation.stages import pistons
 from baselines.impedance import Impedance
-from baselines.staged import LawStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, shown
@@ -56,8 +56,8 @@ class CartesianBackstepping(StagedController):
         require_stiffness(reference, self._least_stiffness)
         return cartesian_impedance(reference, self.parameters)
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
-        law = LawStage(cartesian_law.control, self._constants, np.zeros(0))
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
+        law = ControllerStage(cartesian_law.control, self._constants, np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

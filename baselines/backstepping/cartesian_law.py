@@ -13,7 +13,7 @@ friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever 
 
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import is_stiffer, square_root
-from baselines.estimation.stages import Estimate
+from baselines.estimation.stages import PistonEstimate
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
@@ -62,9 +62,9 @@ class Constants(Numbers):
 
 
 @helper
-def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
+def law(seen: Seen, joints: Joints, constants: Constants, n: int) -> None:
     """Writes the openings of n lanes."""
-    p, c4, width, target, opening = about.rig, about.pneumatic_gain, about.sign_width, seen.asked, seen.opening
+    p, c4, width, target, opening = constants.rig, constants.pneumatic_gain, constants.sign_width, seen.asked, seen.opening
     for i in range(n):
         y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
         pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
@@ -106,11 +106,11 @@ def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
 
 
 @kernel
-def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are too soft."""
     missed, asked = 0, seen.asked
     for i in range(n):
         kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
-        missed += 0 if is_stiffer(kx, ky, kxy, about.least_stiffness) else 1
-    law(seen, Estimate(seen.handed[: Estimate.size]).joints, about, n)
+        missed += 0 if is_stiffer(kx, ky, kxy, constants.least_stiffness) else 1
+    law(seen, PistonEstimate(seen.intermediate[: PistonEstimate.size]).joints, constants, n)
     return missed

@@ -13,9 +13,9 @@ from baselines.backstepping.law import Options, Terms
 from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import check_flags
 from baselines.estimation.observers import measured_joints
-from baselines.estimation.stages import JOINTS, Estimate, pistons
+from baselines.estimation.stages import JOINTS, PistonEstimate, pistons
 from baselines.impedance import Impedance
-from baselines.staged import LawStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import ACTION, ASKED, Seen
 from birthsim_env.loop.signals import Joints, Measurement, Reference
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
@@ -39,7 +39,7 @@ STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class LawTerms:
+class BacksteppingTerms:
     """What the law knows and wants at one instant in N lanes; the second-last axis counts cylinders 1 and 2. SI units.
 
     - ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated;
@@ -66,8 +66,10 @@ class Constants(Numbers):
 
 
 @kernel
-def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
-    return backstepping_law.command(seen, Estimate(seen.handed[: Estimate.size]).joints, about.rig, about.options, n)
+def _stage(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
+    return backstepping_law.command(
+        seen, PistonEstimate(seen.intermediate[: PistonEstimate.size]).joints, constants.rig, constants.options, n
+    )
 
 
 @kernel
@@ -187,8 +189,8 @@ class BacksteppingController(StagedController):
         """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
         return paper_impedance(reference, self.parameters, self.damping_ratio)
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
-        law = LawStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
+        law = ControllerStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
@@ -222,7 +224,7 @@ class BacksteppingController(StagedController):
         feedforward_force: Array | None = None,
         feedforward_rate: Array | None = None,
         damping_factor: Array | None = None,
-    ) -> LawTerms:
+    ) -> BacksteppingTerms:
         """What ``command`` would want with the same signals, over N lanes.
 
         Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
@@ -235,4 +237,6 @@ class BacksteppingController(StagedController):
         _inspect(seen, joints, Rig(self._p), Options(self._options), terms)
         gains, rates = (one.rows.reshape(3, 2, lanes) for one in (terms.gains, terms.gain_rates))
         intent = terms.intent
-        return LawTerms(joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate)
+        return BacksteppingTerms(
+            joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate
+        )

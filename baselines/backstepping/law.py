@@ -45,7 +45,7 @@ class Options(Numbers):
     force_first = number("1", "1 where the pneumatic stiffness gives way to the force when a valve saturates, else 0")
 
 
-class Wanted(Joints):
+class JointReference(Joints):
     """The reference in joint coordinates."""
 
     acceleration = rows("a1 a2", "m/s2", "acceleration")
@@ -60,14 +60,14 @@ class Gains(Rows):
     c3 = rows("c3_1 c3_2", "1/s", "of the force")
 
 
-class Needs(Rows):
+class GainInputs(Rows):
     """What gains follow from."""
 
     stiffness = rows("Kcl1 Kcl2", "N/m", "closed-loop stiffness of the cylinders (18)")
     mass = row("kg", "apparent mass m kappa^2 of cylinder 1")
 
 
-class Intent(Rows):
+class DesiredForce(Rows):
     """What the law wants."""
 
     force_rate = rows("dF1 dF2", "N/s", "dF/dt")
@@ -84,11 +84,11 @@ class Openings(Rows):
 class Terms(Rows):
     """What the law works out at one instant."""
 
-    wanted = part(Wanted, "reference")
-    needs = part(Needs, "of the gains")
+    wanted = part(JointReference, "reference")
+    needs = part(GainInputs, "of the gains")
     gains = part(Gains, "gains")
     gain_rates = part(Gains, "their rates at constant setpoints, where they are inspected")
-    intent = part(Intent, "what the law wants")
+    intent = part(DesiredForce, "what the law wants")
 
 
 LEAST_FACTOR = 1.01
@@ -122,7 +122,7 @@ def outer_jerk(v: float, a: float, vd: float, ad: float, jd: float, c1: float, c
 
 
 @helper
-def needs_of_gains(joints: Joints, target: Reference, p: Rig, needs: Needs, n: int) -> None:
+def needs_of_gains(joints: Joints, target: Reference, p: Rig, needs: GainInputs, n: int) -> None:
     """Writes what the gains of n lanes follow from."""
     for i in range(n):
         y1, y2 = joints.position[0, i], joints.position[1, i]
@@ -136,7 +136,7 @@ def needs_of_gains(joints: Joints, target: Reference, p: Rig, needs: Needs, n: i
 
 
 @helper
-def equal_gains(needs: Needs, p: Rig, gains: Gains, n: int) -> int:
+def equal_gains(needs: GainInputs, p: Rig, gains: Gains, n: int) -> int:
     """Writes ``gains`` with c1 = c2 = c3; returns the number of lanes without any."""
     misses = 0
     for i in range(n):
@@ -153,7 +153,7 @@ def equal_gains(needs: Needs, p: Rig, gains: Gains, n: int) -> int:
 
 
 @helper
-def damped_gains(needs: Needs, p: Rig, ratio: float, gains: Gains, n: int) -> int:
+def damped_gains(needs: GainInputs, p: Rig, ratio: float, gains: Gains, n: int) -> int:
     """As ``equal_gains``, with c1 = c3 for the damping B = 2 ``ratio`` sqrt(K m_e)."""
     misses = 0
     for i in range(n):
@@ -171,7 +171,7 @@ def damped_gains(needs: Needs, p: Rig, ratio: float, gains: Gains, n: int) -> in
 
 
 @helper
-def raise_damping(needs: Needs, p: Rig, factor: Array, gains: Gains, n: int) -> None:
+def raise_damping(needs: GainInputs, p: Rig, factor: Array, gains: Gains, n: int) -> None:
     """Turns equal ``gains`` into those of ``factor`` (n,) times their damping where that is more."""
     for i in range(n):
         if factor[i] > LEAST_FACTOR:
@@ -277,7 +277,9 @@ def openings_of(rate: float, stiffness_rate: float, air: CylinderAir, p: Rig, op
 
 
 @helper
-def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Rig, options: Options, openings: Openings, n: int) -> None:
+def openings_for(
+    seen: Seen, joints: Joints, intent: DesiredForce, p: Rig, options: Options, openings: Openings, n: int
+) -> None:
     """Writes the ``openings`` of n lanes for what the law wants."""
     opening, pressure, rate, stiffness_rate = openings.opening, seen.pressure, intent.force_rate, intent.stiffness_rate
     for i in range(n):

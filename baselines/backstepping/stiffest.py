@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from baselines.staged import LawStage
+from baselines.staged import ControllerStage
 from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference
@@ -54,9 +54,9 @@ def _stage(world: int, seen: Seen, memory: int, limit: Limit, tables: int, lane:
     return beyond
 
 
-def stiffness_range(rig: Parameters, sampled: bool) -> LawStage:
+def stiffness_range(rig: Parameters, sampled: bool) -> ControllerStage:
     """The stage that refuses stiffer setpoints."""
-    return LawStage(_stage, Limit.numbers(stiffest=stiffest(rig, sampled)), np.zeros(0))
+    return ControllerStage(_stage, Limit.numbers(stiffest=stiffest(rig, sampled)), np.zeros(0))
 
 
 def require_softer(reference: Reference, rig: Parameters, sampled: bool) -> None:

@@ -16,7 +16,7 @@ from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
-from baselines.controller import Controller, Law, controller_of
+from baselines.controller import CommandFunction, Controller, controller_of
 from baselines.staged import Driving, driving
 from baselines.tables import aligned, markdown
 from birthsim_env.assembly import Arguments, refuse_unknown, spelled_out
@@ -87,7 +87,7 @@ class Evaluation:
 @spelled_out(*GIVEN)
 def evaluate(
     environment: str,
-    controller: Controller | Law,
+    controller: Controller | CommandFunction,
     name: str,
     episodes: int,
     seed: int,
@@ -107,7 +107,7 @@ def evaluate(
 
 def evaluate_worlds(
     environment: str,
-    controller: Controller | Law,
+    controller: Controller | CommandFunction,
     name: str,
     seeds: Sequence[int],
     rigs: Array | None,
@@ -181,9 +181,9 @@ def _run_batch(
     for step in range(0, env.steps, at_once):
         steps = min(at_once, env.steps - step)
         simulation.run(steps)
-        fallen = measures.fallen()
-        if fallen.any():
-            controller.reset(fallen)
+        terminated = measures.terminated()
+        if terminated.any():
+            controller.reset(terminated)
         if not own.alive.any():
             break
         bar.update(steps)

@@ -1,8 +1,8 @@
 """What an evaluation measures as two stages of the closed loop: nothing of it stops the loop.
 
-``_see`` samples metrics and error once the controller has commanded. ``_pay`` rewards the period when the rig is at its end. A
-lane that leaves the physical range is lost: it is measured no further, and put back to where its episode began, where it
-harms nothing.
+``_measure`` samples metrics and error once the controller has commanded. ``_reward`` rewards the period when the rig is at its
+end. A lane that leaves the physical range is lost: it is measured no further, and put back to where its episode began, where
+it harms nothing.
 """
 
 import numpy as np
@@ -35,15 +35,15 @@ class Memory(Tally):
     last = rows(4, "1", "those of the period before")
     state = rows(STATES, "SI", "where the episode began")
     motion = rows(4, "SI", "of the end effector there")
-    owed = part(reward.Owed, "for the reward")
-    calm = part(reward.Tally, "for success")
+    target_lag = part(reward.TargetLag, "for the reward")
+    tally = part(reward.Tally, "for success")
     success = row("1", "1 where the episode is successful so far")
-    fallen = row("1", "1 where the lane has left the physical range")
+    terminated = row("1", "1 where the lane has left the physical range")
     weight = rows(len(DISCOUNTS), "1", "of the next reward, for each of ``DISCOUNTS``")
     returns = rows(len(DISCOUNTS), "1", "sums of the rewards so far")
 
 
-class About(Numbers):
+class Constants(Numbers):
     """Constants of the stages."""
 
     limits = part(reward.Limits, "of the environment")
@@ -52,18 +52,18 @@ class About(Numbers):
 
 
 @kernel
-def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
+def _measure(world: World, seen: Seen, own: Memory, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Tables: positions kept for the metrics (W, 2, N); error (T, 2, N), m."""
-    now, every, reference = Info(scratch(Info.size)), int(about.every), seen.reference
+    now, every, reference = Info(scratch(Info.size)), int(constants.every), seen.reference
     kept, errors = table3(tables, 0)[:, :, lane : lane + n], table3(tables, 1)[:, :, lane : lane + n]
     describe(world, seen, now, n)
     for i in range(n):
         number = int(own.count[i])
         if number == 0:
             kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
-            given = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
+            offset = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
             for axis in range(2):
-                own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
+                own.target_lag.offset[axis, i], own.target_lag.remaining[axis, i] = offset[axis], offset[axis]
             for k in range(STATES):
                 own.state[k, i] = world.state[k, i]
             for k in range(4):
@@ -73,23 +73,23 @@ def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
                 errors[number // every, axis, i] = now.tracking_error[axis, i]
         world.impact[0, i], world.impact[1, i] = 0.0, 0.0
     load(seen.opening, 0, n, own.command)
-    sample(now, own.command, about.limits.period, own, kept, n)
+    sample(now, own.command, constants.limits.period, own, kept, n)
     return 0
 
 
 @kernel
-def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
+def _reward(world: World, seen: Seen, own: Memory, constants: Constants, tables: int, lane: int, n: int) -> int:
     terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), Ends(scratch(Ends.size)), seen.reference
-    failed = ends.failed
-    reward.assess(world, reference, own.owed, own.command, own.last, about.limits, terms, failed, n)
-    reward.add(world, reference, failed, own.calm, ends.success, n)
+    terminated = ends.terminated
+    reward.assess(world, reference, own.target_lag, own.command, own.last, constants.limits, terms, terminated, n)
+    reward.add(world, reference, terminated, own.tally, ends.success, n)
     for i in range(n):
-        paid = terms.total[i] if own.alive[i] > 0.0 else 0.0
+        total = terms.total[i] if own.alive[i] > 0.0 else 0.0
         for k in range(len(DISCOUNTS)):
-            own.returns[k, i] += own.weight[k, i] * paid
-            own.weight[k, i] *= about.discounts[k]
-        if failed[i] > 0.0:
-            own.alive[i], own.fallen[i] = 0.0, 1.0
+            own.returns[k, i] += own.weight[k, i] * total
+            own.weight[k, i] *= constants.discounts[k]
+        if terminated[i] > 0.0:
+            own.alive[i], own.terminated[i] = 0.0, 1.0
             for k in range(STATES):
                 world.state[k, i] = own.state[k, i]
             for k in range(4):
@@ -116,12 +116,12 @@ class Measures:
         limits = reward.Limits.numbers(
             period=period, jumped_below=period - 0.5 * period, impact_speed=simulation.parameters.mechanics.impact_speed
         )
-        about = About.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
-        see = Stage(_see, about, self.own.rows, (window(lanes, period), self.error))
-        self.stops = simulation.watch([see], [Stage(_pay, about, self.own.rows)])
+        constants = Constants.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
+        see = Stage(_measure, constants, self.own.rows, (window(lanes, period), self.error))
+        self.stops = simulation.watch([see], [Stage(_reward, constants, self.own.rows)])
 
-    def fallen(self) -> NDArray[np.bool_]:
+    def terminated(self) -> NDArray[np.bool_]:
         """Lanes (N,) that have left the physical range since the last call."""
-        fallen: NDArray[np.bool_] = self.own.fallen > 0.0
-        self.own.fallen[:] = 0.0
-        return fallen
+        terminated: NDArray[np.bool_] = self.own.terminated > 0.0
+        self.own.terminated[:] = 0.0
+        return terminated

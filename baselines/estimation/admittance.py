@@ -93,24 +93,24 @@ def advance(offset: Point, i: int, period: float, rates: tuple[float, float, flo
 
 
 @helper
-def give_way(offset: Point, asked: Reference, force: Array, about: Compliance, factor: Array, motion: Motion) -> int:
+def update_motion(offset: Point, asked: Reference, force: Array, constants: Compliance, factor: Array, motion: Motion) -> int:
     """Writes ``motion`` and carries ``offset`` on by one period; returns how many setpoints are not positive definite.
 
     ``force`` (2, N), N, is the hand's; ``factor`` (N,) multiplies the damping where it is more than 1.
     """
-    missed, mass, push = 0, about.mass, InPlane(force)
+    missed, mass, push = 0, constants.mass, InPlane(force)
     for i in range(factor.shape[0]):
         stiffer = is_stiffer(asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i], 0.0)
         missed += 0 if stiffer else 1
     for i in range(factor.shape[0]):
-        spring = spring_of(asked, i, mass, about.damping_ratio * max(1.0, factor[i]))
+        spring = spring_of(asked, i, mass, constants.damping_ratio * max(1.0, factor[i]))
         ax, ay, jx, jy = derivatives(offset, i, push.x[i] / mass, push.y[i] / mass, spring)
         for axis in range(2):
             motion.position[axis, i] = asked.position[axis, i] + offset.position[axis, i]
             motion.velocity[axis, i] = asked.velocity[axis, i] + offset.velocity[axis, i]
         motion.acceleration[0, i], motion.acceleration[1, i] = asked.acceleration[0, i] + ax, asked.acceleration[1, i] + ay
         motion.jerk[0, i], motion.jerk[1, i] = asked.jerk[0, i] + jx, asked.jerk[1, i] + jy
-        advance(offset, i, about.period, (ax, ay, jx, jy), spring)
+        advance(offset, i, constants.period, (ax, ay, jx, jy), spring)
     return missed
 
 
@@ -123,15 +123,15 @@ def mark_moving(motion: Motion, moving: Array) -> None:
 
 
 @helper
-def forecast(offset: Point, asked: Reference, force: Array, about: Compliance, ticks: Array, ahead: Array) -> None:
+def forecast(offset: Point, asked: Reference, force: Array, constants: Compliance, ticks: Array, ahead: Array) -> None:
     """Writes ``ahead`` (4 M, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
 
     The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` is that of one period
-    from now, as ``give_way`` leaves it, and is carried on; ``ticks`` are increasing whole numbers from 1 on.
+    from now, as ``update_motion`` leaves it, and is carried on; ``ticks`` are increasing whole numbers from 1 on.
     """
-    mass, period, push = about.mass, about.period, InPlane(force)
+    mass, period, push = constants.mass, constants.period, InPlane(force)
     for i in range(force.shape[1]):
-        spring, tick = spring_of(asked, i, mass, about.damping_ratio), 1
+        spring, tick = spring_of(asked, i, mass, constants.damping_ratio), 1
         for k in range(len(ticks)):
             while tick < ticks[k]:
                 advance(offset, i, period, derivatives(offset, i, push.x[i] / mass, push.y[i] / mass, spring), spring)

@@ -6,7 +6,7 @@ At rest d takes up friction and the model's errors, so that the force follows th
 the compliance error in disguise.
 """
 
-from baselines.estimation.rows import Belief, Given, Pistons
+from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
@@ -15,14 +15,14 @@ from birthsim_env.physics.inverse_kinematics import piston_motion
 
 
 @helper
-def accelerations(joints: Joints, i: int, pressures: Array, given: Given, p: Rig) -> tuple[float, float, float]:
+def accelerations(joints: Joints, i: int, pressures: Array, inputs: Inputs, p: Rig) -> tuple[float, float, float]:
     """What pressures (4, N) and forces explain of the pistons' accelerations in lane ``i``, m/s2; and kappa."""
     y1, y2 = joints.position[0, i], joints.position[1, i]
     v1, v2 = joints.speed[0, i], joints.speed[1, i]
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
     )
-    force, believed, air = given.force, given.believed, PerChamber(pressures)
+    force, believed, air = inputs.force, inputs.believed, PerChamber(pressures)
     load1 = (
         mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
         - p.fv1 * v1
@@ -35,15 +35,17 @@ def accelerations(joints: Joints, i: int, pressures: Array, given: Given, p: Rig
         + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
         + believed[1, i]
     )
-    inverse_mass = given.inverse_mass[i]
+    inverse_mass = inputs.inverse_mass[i]
     a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, inverse_mass, p.gravity)
     return a1, mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, inverse_mass, p.gravity), kappa
 
 
 @helper
-def observe(pistons: Pistons, point: Point, pressures: Array, given: Given, about: Belief, joints: Joints, n: int) -> None:
+def observe(
+    pistons: Pistons, point: Point, pressures: Array, inputs: Inputs, assumed: AssumedParameters, joints: Joints, n: int
+) -> None:
     """Carries speed and disturbance of n ``pistons`` on by one control period; writes ``joints`` for the measured ``point``."""
-    p, period, bandwidth = about.rig, about.period, about.bandwidth
+    p, period, bandwidth = assumed.rig, assumed.period, assumed.bandwidth
     speed, disturbance = pistons.speed, pistons.disturbance
     piston_motion(point.rows, p, joints.rows, n)
     for i in range(n):
@@ -51,7 +53,7 @@ def observe(pistons: Pistons, point: Point, pressures: Array, given: Given, abou
         if pistons.fresh[i] > 0.0:
             speed[0, i], speed[1, i], disturbance[0, i] = v1, v2, 0.0
             disturbance[1, i], pistons.fresh[i] = 0.0, 0.0
-        a1, a2, _ = accelerations(joints, i, pressures, given, p)
+        a1, a2, _ = accelerations(joints, i, pressures, inputs, p)
         off1, off2 = v1 - speed[0, i], v2 - speed[1, i]
         speed[0, i] += period * (a1 + disturbance[0, i] + 2.0 * bandwidth * off1)
         speed[1, i] += period * (a2 + disturbance[1, i] + 2.0 * bandwidth * off2)

@@ -7,7 +7,7 @@ while the piston slides as u says. Only sliding in both directions separates the
 what the observer found besides, so that it does not depend on what has been learned.
 """
 
-from baselines.estimation.rows import Belief
+from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
@@ -36,13 +36,13 @@ class Friction(Rows):
 
 @helper
 def learn(
-    friction: Friction, drag: Array, joints: Joints, unexplained: Array, rate: float, about: Belief, fresh: Array
+    friction: Friction, drag: Array, joints: Joints, unexplained: Array, rate: float, assumed: AssumedParameters, fresh: Array
 ) -> None:
     """Carries ``friction`` on by one period.
 
     ``drag`` (2, N), N, is the believed friction along the reference; ``unexplained`` (2, N), N, is R; ``rate``, a in 1/s.
     """
-    p, period = about.rig, about.period
+    p, period = assumed.rig, assumed.period
     for i in range(fresh.shape[0]):
         for cylinder in range(2):
             coulomb = p.fc1 if cylinder == 0 else p.fc2

@@ -10,7 +10,7 @@ is a regression that begins at the believed mass m0. Friction that turns moves x
 mass above m0 is not learned. A rig that is lighter than believed swings, and by that tells its mass.
 """
 
-from baselines.estimation.rows import Belief, Given, Pistons
+from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from birthsim_env.loop.signals import PerChamber
 from birthsim_env.physics import mechanics
 from birthsim_env.physics.compiled.compilation import helper
@@ -47,18 +47,18 @@ def learn(
     pose: tuple[float, float, float],
     pistons: Pistons,
     pressures: Array,
-    given: Given,
-    about: Belief,
+    inputs: Inputs,
+    assumed: AssumedParameters,
     fresh: Array,
 ) -> None:
     """Carries lane ``i`` on by one period; ``pose`` is kappa, sin(theta1) and cos(theta1), ``pressures`` (4, N) in Pa."""
-    (kappa, sine, cosine), p, period, air = pose, about.rig, about.period, PerChamber(pressures)
-    fx, fy, mass = given.force[0, i], given.force[1, i], inertia.mass[i]
+    (kappa, sine, cosine), p, period, air = pose, assumed.rig, assumed.period, PerChamber(pressures)
+    fx, fy, mass = inputs.force[0, i], inputs.force[1, i], inertia.mass[i]
     load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere) - p.fv1 * pistons.speed[0, i]
     load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere) - p.fv2 * pistons.speed[1, i]
-    across = cosine * fx + sine * fy - (load1 + given.believed[0, i]) / kappa
-    along = sine * fx - cosine * fy + load2 + given.believed[1, i]
-    share = period * about.bandwidth / (1.0 + period * about.bandwidth)
+    across = cosine * fx + sine * fy - (load1 + inputs.believed[0, i]) / kappa
+    along = sine * fx - cosine * fy + load2 + inputs.believed[1, i]
+    share = period * assumed.bandwidth / (1.0 + period * assumed.bandwidth)
     for k in range(2):
         force, found = (across, -kappa * pistons.disturbance[0, i]) if k == 0 else (along, pistons.disturbance[1, i])
         if fresh[i] > 0.0:

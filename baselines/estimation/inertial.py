@@ -13,7 +13,7 @@ q = 4e-7 m2/s3 and r = 4.2e-11 m2 s; the speed is then known to 0.24 mm/s. Frict
 
 import numpy as np
 
-from baselines.staged import LawStage
+from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Seen, Signals
 from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import block
@@ -57,12 +57,12 @@ class Gains(Numbers):
 
 
 @helper
-def observe(memory: Memory, signals: Signals, about: Gains, point: Moving) -> None:
+def observe(memory: Memory, signals: Signals, constants: Gains, point: Moving) -> None:
     """Carries ``memory`` on by one period and writes ``point``, where and how fast the end effector is now.
 
     The measured velocity counts at a new start only.
     """
-    past, period = memory.past, about.period
+    past, period = memory.past, constants.period
     depth = past.shape[0] // 2
     for i in range(signals.time.shape[0]):
         time, slot = signals.time[i], (int(memory.slot[i]) + 1) % depth
@@ -75,7 +75,7 @@ def observe(memory: Memory, signals: Signals, about: Gains, point: Moving) -> No
         periods = age / period
         back = int(periods)
         part = periods - back
-        width = about.bandwidth + START * exact.exp(-(time - memory.began[i]) / START_TIME)
+        width = constants.bandwidth + START * exact.exp(-(time - memory.began[i]) / START_TIME)
         kept = exact.exp(-width * max(sampled, 0.0))
         for axis in range(2):
             if fresh:
@@ -108,18 +108,18 @@ def observe(memory: Memory, signals: Signals, about: Gains, point: Moving) -> No
 
 
 @kernel
-def stage(world: int, seen: Seen, memory: int, about: Gains, tables: int, lane: int, n: int) -> int:
+def stage(world: int, seen: Seen, memory: int, constants: Gains, tables: int, lane: int, n: int) -> int:
     """Writes ``Moving`` to the first rows that are handed on."""
     signals = Seen(seen.rows[:, :n])
-    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
-    observe(own, signals, about, Moving(signals.handed[: Moving.size]))
+    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
+    observe(own, signals, constants, Moving(signals.intermediate[: Moving.size]))
     return 0
 
 
-def law_stage(rig: Parameters) -> LawStage:
+def controller_stage(rig: Parameters) -> ControllerStage:
     """The stage for a rig as believed, which remembers as much as its tracker asks for."""
     board = rig.electronics
     periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4
     fresh = Memory.lane(fresh=1.0, past=np.zeros(2 * periods))
-    about = Gains.numbers(period=board.control_period, bandwidth=BANDWIDTH, rows_of_memory=len(fresh))
-    return LawStage(stage, about, fresh, reads_acceleration=True)
+    constants = Gains.numbers(period=board.control_period, bandwidth=BANDWIDTH, rows_of_memory=len(fresh))
+    return ControllerStage(stage, constants, fresh, reads_acceleration=True)

@@ -19,7 +19,7 @@ low-passed innovation is larger than noise explains, or when the observer is giv
 import numpy as np
 
 from baselines.estimation.disturbance_observer import accelerations
-from baselines.estimation.rows import Belief, Given, Pistons
+from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints, Measurement, Point
 from birthsim_env.loop.stage import scratch
@@ -73,12 +73,12 @@ def begin(pistons: Pistons, i: int, point: Point, p: Rig, joints: Joints) -> Non
 
 
 @helper
-def predict(pistons: Pistons, i: int, pressures: Array, given: Given, p: Rig, period: float) -> float:
+def predict(pistons: Pistons, i: int, pressures: Array, inputs: Inputs, p: Rig, period: float) -> float:
     """Carries positions and speeds of lane ``i`` on by one period of the model; returns kappa where it began."""
     position, speed = pistons.position, pistons.speed
     y1, y2 = position[0, i], position[1, i]
     v1, v2 = speed[0, i], speed[1, i]
-    a1, a2, kappa = accelerations(pistons, i, pressures, given, p)
+    a1, a2, kappa = accelerations(pistons, i, pressures, inputs, p)
     a1, a2 = a1 + pistons.disturbance[0, i], a2 + pistons.disturbance[1, i]
     position[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p.half_l1), p.half_l1)
     position[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p.half_l2), p.half_l2)
@@ -102,14 +102,20 @@ def rest(pistons: Pistons, i: int, moving: float, period: float, held: float) ->
 
 @helper
 def correct(
-    pistons: Pistons, i: int, joints: Joints, sampled: float, age: float, about: Belief, explained: tuple[float, float]
+    pistons: Pistons,
+    i: int,
+    joints: Joints,
+    sampled: float,
+    age: float,
+    assumed: AssumedParameters,
+    explained: tuple[float, float],
 ) -> None:
     """Takes a sample: the pistons stood at the one lane of ``joints`` an ``age`` ago, ``sampled`` s after the last one.
 
     A low-passed innovation beyond what is ``explained`` of each piston, m, ends its rest.
     """
     (explained1, explained2), past = explained, pistons.past
-    slot, period = int(pistons.slot[i]), about.period
+    slot, period = int(pistons.slot[i]), assumed.period
     depth, periods = past.shape[0] // 2, age / period
     back = min(int(periods), depth - 2)
     part = min(periods - back, 1.0)
@@ -122,7 +128,7 @@ def correct(
         if abs(pistons.innovation[cylinder, i]) > (explained1 if cylinder == 0 else explained2):
             pistons.reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
             pistons.rest[cylinder, i], resting = 0.0, 0.0
-        kept = exact.exp(-about.bandwidth * sampled)
+        kept = exact.exp(-assumed.bandwidth * sampled)
         to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled))
         to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
         to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled**2
@@ -137,9 +143,9 @@ def correct(
 
 
 @helper
-def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, about: Belief) -> None:
+def observe(pistons: Pistons, signals: Signals, pressures: Array, inputs: Inputs, assumed: AssumedParameters) -> None:
     """One control period of N lanes, in which positions are samples and pressures (4, N), Pa, are known."""
-    p, period, held = about.rig, about.period, exact.exp(-REST_BANDWIDTH * about.period)
+    p, period, held = assumed.rig, assumed.period, exact.exp(-REST_BANDWIDTH * assumed.period)
     past, point, joints = pistons.past, Point(scratch(Point.size)), Joints(scratch(Joints.size))
     depth = past.shape[0] // 2
     for i in range(signals.time.shape[0]):
@@ -153,13 +159,13 @@ def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, 
         if pistons.fresh[i] > 0.0:
             begin(pistons, i, point, p, joints)
             continue
-        kappa = predict(pistons, i, pressures, given, p, period)
-        rest(pistons, i, given.moving[i], period, held)
+        kappa = predict(pistons, i, pressures, inputs, p, period)
+        rest(pistons, i, inputs.moving[i], period, held)
         past[2 * slot, i], past[2 * slot + 1, i] = pistons.position[0, i], pistons.position[1, i]
         if sampled > 0.0:
             piston_motion(point.rows, p, joints.rows, 1)
-            explained = STIR * given.noise[i]
-            correct(pistons, i, joints, sampled, age, about, (explained / kappa, explained))
+            explained = STIR * inputs.noise[i]
+            correct(pistons, i, joints, sampled, age, assumed, (explained / kappa, explained))
 
 
 def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:
@@ -176,9 +182,9 @@ def fresh_memory(rig: Parameters, sampled: bool) -> Array:
     return Pistons.lane(fresh=1.0, past=np.zeros(2 * periods))
 
 
-def belief(rig: Parameters, bandwidth: float = BANDWIDTH) -> Array:
-    """``Belief`` in a rig."""
+def assumed_parameters(rig: Parameters, bandwidth: float = BANDWIDTH) -> Array:
+    """``AssumedParameters`` in a rig."""
     board = rig.electronics
-    return Belief.numbers(
+    return AssumedParameters.numbers(
         period=board.control_period, bandwidth=bandwidth, noise=board.position_noise, rig=parameter_column(rig)
     )

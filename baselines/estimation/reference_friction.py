@@ -21,7 +21,7 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Rig, perio
 
 
 @helper
-def _rub(joints: Joints, p: Rig, period: float, bristles: Array, drag: Array) -> None:
+def _update_bristle(joints: Joints, p: Rig, period: float, bristles: Array, drag: Array) -> None:
     for cylinder in range(2):
         coulomb, static = (p.fc1, p.fs1) if cylinder == 0 else (p.fc2, p.fs2)
         for i in range(bristles.shape[1]):
@@ -30,22 +30,22 @@ def _rub(joints: Joints, p: Rig, period: float, bristles: Array, drag: Array) ->
 
 
 @helper
-def rub(motion: Motion, p: Rig, period: float, bristles: Array, drag: Array) -> None:
+def update_bristle(motion: Motion, p: Rig, period: float, bristles: Array, drag: Array) -> None:
     """Carries ``bristles`` (2, N) on by one period of ``motion`` and writes what they hold back, ``drag`` (2, N), N.
 
     N is at most that of a block.
     """
     joints, lanes = Joints(scratch(Joints.size)), bristles.shape[1]
     piston_motion(motion.rows, p, joints.rows, lanes)
-    _rub(joints, p, period, bristles, drag)
+    _update_bristle(joints, p, period, bristles, drag)
 
 
 @helper
 def forecast(ahead: Array, p: Rig, steps: Array, bristles: Array, drag: Array) -> None:
     """Writes the friction ``drag`` (2 M, N), N, along a motion ``ahead`` (4 M, N) with x, y, vx, vy at the ends of the M
-    ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them, and carries these on."""
+    ``steps``, s, that begins with ``bristles`` (2, N) as ``update_bristle`` leaves them, and carries these on."""
     joints, (cylinders, lanes) = Joints(scratch(Joints.size)), bristles.shape
     for k in range(len(steps)):
         motion, own = Point.size * k, cylinders * k
         piston_motion(ahead[motion : motion + Point.size], p, joints.rows, lanes)
-        _rub(joints, p, steps[k], bristles, drag[own : own + cylinders])
+        _update_bristle(joints, p, steps[k], bristles, drag[own : own + cylinders])

@@ -18,7 +18,7 @@ class Pistons(Joints):
     past = rows(0, "m", "y1, y2 of the last periods in turns, a ring; none where speeds are measured")
 
 
-class Given(Rows):
+class Inputs(Rows):
     """What an observer of the pistons is given besides samples and pressures."""
 
     force = rows("Fx Fy", "N", "force of the hand, as far as it is known")
@@ -28,7 +28,7 @@ class Given(Rows):
     noise = row("m", "standard deviation of a position sample")
 
 
-class Belief(Numbers):
+class AssumedParameters(Numbers):
     """What an observer of the pistons believes of the rig."""
 
     period = number("s", "control period")

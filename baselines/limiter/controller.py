@@ -29,7 +29,7 @@ from baselines.impedance import Impedance, declared_by
 from baselines.limiter import air_spring
 from baselines.limiter.past import recall, slots_of
 from baselines.limiter.port_energy import Energy, Work, count_work
-from baselines.staged import LawStage, StagedController, lanes_of, one_lane
+from baselines.staged import ControllerStage, StagedController, lanes_of, one_lane
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerChamber, Point, Reference
 from birthsim_env.loop.stage import Part, Stage, block, scratch
@@ -57,7 +57,7 @@ FULL = 2.0
 """The brake is on in full at so many times the speed limit."""
 
 
-class Late(Rows):
+class PastSignals(Rows):
     """What is kept for late positions."""
 
     pressure = rows(4, "Pa", "of the chambers")
@@ -98,7 +98,7 @@ def _spring_energy(kx: float, ky: float, kxy: float, x: float, y: float) -> floa
 
 
 @helper
-def _fill(tank: Tank, work: Work, asked: Reference, about: Limits, i: int) -> None:
+def _fill(tank: Tank, work: Work, asked: Reference, constants: Limits, i: int) -> None:
     """Carries tanks and authority of lane ``i`` on by one period, in which the hand did ``work``."""
     last, (x, y) = tank.stiffness, (tank.energy.offset[0, i], tank.energy.offset[1, i])
     kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
@@ -112,12 +112,12 @@ def _fill(tank: Tank, work: Work, asked: Reference, about: Limits, i: int) -> No
         done = work.done[count, i]
         done = max(done, min(done + work.asked[count, i], 0.0)) + ALLOWANCE * work.path[count, i]
         # Whoever asks for a stiffer spring while it is stretched pays for it.
-        level = min(tank.level[count, i] + done + max(stored - before, 0.0), MARGIN * stored + about.capacity)
+        level = min(tank.level[count, i] + done + max(stored - before, 0.0), MARGIN * stored + constants.capacity)
         least, tank.level[count, i] = min(least, level), max(level, 0.0)
     authority = tank.authority[i]
-    tank.ceiling[i] += about.lasting * (authority - tank.ceiling[i]) + about.recovery * (1.0 - tank.ceiling[i])
-    returned = authority + about.back * max(tank.ceiling[i] - authority, 0.0)
-    tank.authority[i] = min(min(max(least / about.capacity, 0.0), 1.0), returned)
+    tank.ceiling[i] += constants.lasting * (authority - tank.ceiling[i]) + constants.recovery * (1.0 - tank.ceiling[i])
+    returned = authority + constants.back * max(tank.ceiling[i] - authority, 0.0)
+    tank.authority[i] = min(min(max(least / constants.capacity, 0.0), 1.0), returned)
 
 
 @helper
@@ -133,42 +133,46 @@ def _brake(seen: Seen, speed: float, moving: Joints, i: int) -> None:
 
 
 @helper
-def _joints(seen: Seen, about: Limits, still: bool, asked: bool, joints: Joints, n: int) -> None:
+def _joints(seen: Seen, constants: Limits, still: bool, asked: bool, joints: Joints, n: int) -> None:
     """Writes the pistons where the end effector is, or is ``asked`` to be; ``still``, or relative to the target."""
     motion, target = Point(scratch(Point.size)), seen.reference
     for k in range(2):
         for i in range(n):
             motion.position[k, i] = target.position[k, i] if asked else seen.position[k, i]
             motion.velocity[k, i] = 0.0 if still else seen.velocity[k, i] - target.velocity[k, i]
-    piston_motion(motion.rows, about.rig, joints.rows, n)
+    piston_motion(motion.rows, constants.rig, joints.rows, n)
 
 
 @kernel
-def limit(world: int, seen: Seen, memory: int, about: Limits, tables: int, lane: int, n: int) -> int:
+def limit(world: int, seen: Seen, memory: int, constants: Limits, tables: int, lane: int, n: int) -> int:
     """Bounds the openings of the law before."""
-    slots = int(about.slots)
-    tank, work = Tank(block(memory, Tank.size + Late.size * slots)), Work(scratch(Work.size))
-    now, then, passive = Late(scratch(Late.size)), Late(scratch(Late.size)), PerChamber(scratch(PerChamber.size))
+    slots = int(constants.slots)
+    tank, work = Tank(block(memory, Tank.size + PastSignals.size * slots)), Work(scratch(Work.size))
+    now, then, passive = (
+        PastSignals(scratch(PastSignals.size)),
+        PastSignals(scratch(PastSignals.size)),
+        PerChamber(scratch(PerChamber.size)),
+    )
     here, there = Joints(scratch(Joints.size)), Joints(scratch(Joints.size))
-    if about.capacity < math.inf:
-        _joints(seen, about, True, False, here, n)
-        _joints(seen, about, True, True, there, n)
+    if constants.capacity < math.inf:
+        _joints(seen, constants, True, False, here, n)
+        _joints(seen, constants, True, True, there, n)
         load(seen.pressure, 0, n, now.pressure)
         load(seen.user_force, 0, n, now.force.rows)
         for i in range(n):
-            late = (seen.time[i] - seen.position_time[i]) / about.period
+            late = (seen.time[i] - seen.position_time[i]) / constants.period
             recall(tank.past, tank.newest, slots, late, now.rows, then.rows, i)
             count_work(tank.energy, seen, then.force.rows, work, i)
-            _fill(tank, work, seen.reference, about, i)
+            _fill(tank, work, seen.reference, constants, i)
             air_spring.passive_openings(
-                tank.forces, about.balance, then.pressure, then.force, here, there, seen, about.rig, passive.rows, i
+                tank.forces, constants.balance, then.pressure, then.force, here, there, seen, constants.rig, passive.rows, i
             )
             for valve in range(4):
                 own = tank.authority[i]
                 seen.opening[valve, i] = own * seen.opening[valve, i] + (1.0 - own) * passive.rows[valve, i]
-    _joints(seen, about, False, False, here, n)
+    _joints(seen, constants, False, False, here, n)
     for i in range(n):
-        _brake(seen, about.speed, here, i)
+        _brake(seen, constants.speed, here, i)
     return 0
 
 
@@ -215,12 +219,12 @@ class PortLimiter(StagedController):
         """That of the law, which holds where neither limit acts."""
         return declared_by(self.law, reference)
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         period = self.parameters.electronics.control_period
         lasting, recovery, back, balance = (
             1.0 - exact.number("exp", -period / lag) for lag in (LASTING, RECOVERY, BACK, air_spring.MEMORY)
         )
-        about = Limits.numbers(
+        constants = Limits.numbers(
             capacity=self._capacity,
             speed=self._speed,
             period=period,
@@ -238,9 +242,9 @@ class PortLimiter(StagedController):
             stiffness=np.nan,
             energy=Energy.lane(stamp=-np.inf),
             forces=np.nan,
-            past=np.full(Late.size * slots_of(period), np.nan),
+            past=np.full(PastSignals.size * slots_of(period), np.nan),
         )
-        return [LawStage(limit, about, fresh)]
+        return [ControllerStage(limit, constants, fresh)]
 
     def prepare(self, lanes: int, sampled: bool) -> None:
         if self._stages is not None:

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from baselines.backstepping.law import Wanted
-from baselines.estimation.stages import Estimate
-from baselines.staged import LawStage
+from baselines.backstepping.law import JointReference
+from baselines.estimation.stages import PistonEstimate
+from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import InPlane
 from birthsim_env.physics import geometry
@@ -25,7 +25,7 @@ SIGN_WIDTH = 0.01
 """m/s; assumed: over this REFERENCE speed the Coulomb feedforward goes from rest to sliding, slowly enough for the valves."""
 
 
-class Needed(Rows):
+class RequiredForce(Rows):
     """What the motion needs, at the reference pose."""
 
     force = rows("F1 F2", "N", "F*")
@@ -33,11 +33,11 @@ class Needed(Rows):
     kappa = row("1", "amplification of cylinder 1")
 
 
-class Tracked(Estimate):
+class Tracking(PistonEstimate):
     """What the stages before a law hand on."""
 
-    wanted = part(Wanted, "where the pistons should be")
-    needed = part(Needed, "forces")
+    wanted = part(JointReference, "where the pistons should be")
+    needed = part(RequiredForce, "forces")
 
 
 @helper
@@ -50,7 +50,7 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 
 
 @helper
-def needed_forces(tracked: Tracked, hand: Array, p: Rig, fraction: float, n: int) -> None:
+def needed_forces(tracked: Tracking, hand: Array, p: Rig, fraction: float, n: int) -> None:
     """Writes what is needed for the motion and its pistons, while the ``hand`` pushes with (2, N), N."""
     wanted, motion, needed, push = tracked.wanted, tracked.motion, tracked.needed, InPlane(hand)
     for i in range(n):
@@ -83,13 +83,13 @@ class Constants(Numbers):
 
 
 @kernel
-def _look_ahead(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
-    tracked = Tracked(seen.handed[: Tracked.size])
-    piston_reference(tracked.motion.rows, about.rig, tracked.wanted.rows, n)
-    needed_forces(tracked, seen.user_force, about.rig, about.fraction, n)
+def _look_ahead(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
+    tracked = Tracking(seen.intermediate[: Tracking.size])
+    piston_reference(tracked.motion.rows, constants.rig, tracked.wanted.rows, n)
+    needed_forces(tracked, seen.user_force, constants.rig, constants.fraction, n)
     return 0
 
 
-def feedforward(rig: Parameters, fraction: float) -> LawStage:
-    """Finds what ``Tracked`` adds of the motion, with a ``fraction`` of the Coulomb friction that is believed."""
-    return LawStage(_look_ahead, Constants.numbers(fraction=fraction, rig=parameter_column(rig)), np.zeros(0))
+def feedforward(rig: Parameters, fraction: float) -> ControllerStage:
+    """Finds what ``Tracking`` adds of the motion, with a ``fraction`` of the Coulomb friction that is believed."""
+    return ControllerStage(_look_ahead, Constants.numbers(fraction=fraction, rig=parameter_column(rig)), np.zeros(0))

@@ -64,7 +64,7 @@ class Outputs(Point):
 STATE, FORCES, OUTPUTS = State.size, Forces.size, Outputs.size
 
 
-class Situation(Rows):
+class HorizonInputs(Rows):
     """What a plan begins with, and what is asked for and expected at each node."""
 
     joints = part(Joints, "pistons")
@@ -195,14 +195,14 @@ def step_to(
     f: Array,
     p: Array,
     k: int,
-    about: Horizon,
+    constants: Horizon,
     points: Array,
     total: Array,
     q: Array,
     n: int,
 ) -> None:
     """Takes ``x`` (8, n) and ``flows`` (4, n) to node ``k``; ``points`` (STAGES POINT, n) get rates and slopes."""
-    step, kept = about.step[k], about.kept[k]
+    step, kept = constants.step[k], constants.kept[k]
     trial = scratch(STATE)
     load(x, 0, n, total)
     load(x, 0, n, trial)
@@ -226,11 +226,11 @@ def step_to(
 
 @helper
 def _tangent_step(
-    s: Array, chamber: int, begun: float, own: bool, k: int, about: Horizon, points: Array, total: Array, out: Array, n: int
+    s: Array, chamber: int, begun: float, own: bool, k: int, constants: Horizon, points: Array, total: Array, out: Array, n: int
 ) -> None:
     """Takes a tangent ``s`` (8, n) to node ``k``, of a flow whose own tangent was ``begun`` at its beginning and goes towards 1
     where it is this step's ``own``, else towards 0."""
-    step, kept, end = about.step[k], about.kept[k], 1.0 if own else 0.0
+    step, kept, end = constants.step[k], constants.kept[k], 1.0 if own else 0.0
     trial = scratch(MOVING)
     load(s, 0, n, total)
     for row in range(STATE + FLOWS):
@@ -251,19 +251,19 @@ def _tangent_step(
 
 
 @helper
-def programme(plan: Array, given: Situation, p: Array, about: Horizon, h: Array, g: Array, n: int) -> None:
+def programme(plan: Array, inputs: HorizonInputs, p: Array, constants: Horizon, h: Array, g: Array, n: int) -> None:
     """Writes ``h`` (HALF, n), the squared slopes of the residuals to the flows, and ``g`` (SIZE, n), the slope of half the sum
     of squares at ``plan`` (SIZE, n), kg/s. ``p`` (PARAMETERS, n)."""
     x, flows, f, points = scratch(STATE), scratch(FLOWS), scratch(FORCES), scratch(POINTS)
     total, q, out = scratch(STATE), scratch(FLOWS), scratch(STATE)
     s, seen, slopes = scratch(TANGENTS), scratch(SEEN), scratch(SEEN_SLOPES)
-    now, pushes, across = State(x), Forces(f), 1.0 / (about.flow * about.flow)
+    now, pushes, across = State(x), Forces(f), 1.0 / (constants.flow * constants.flow)
     for row in range(HALF):
         for i in range(n):
             h[row, i] = 0.0
     for row in range(SIZE):
         for i in range(n):
-            before = given.flow[row, i] if row < FLOWS else plan[row - FLOWS, i]
+            before = inputs.flow[row, i] if row < FLOWS else plan[row - FLOWS, i]
             change = plan[row, i] - before
             g[row, i] = across * change
             h[place(row, row), i] = across
@@ -276,32 +276,36 @@ def programme(plan: Array, given: Situation, p: Array, about: Horizon, h: Array,
             s[row, i] = 0.0
     for row in range(4):
         for i in range(n):
-            x[row, i], now.pressure[row, i] = given.joints.rows[row, i], given.pressure[row, i]
-            flows[row, i], f[row, i] = given.flow[row, i], given.force[row, i] if row < 2 else 0.0
+            x[row, i], now.pressure[row, i] = inputs.joints.rows[row, i], inputs.pressure[row, i]
+            flows[row, i], f[row, i] = inputs.flow[row, i], inputs.force[row, i] if row < 2 else 0.0
     for k in range(NODES):
         for axis in range(2):
             for i in range(n):
-                pushes.unseen[axis, i] = given.unseen[2 * k + axis, i]
-        step_to(x, flows, plan, f, p, k, about, points, total, q, n)
+                pushes.unseen[axis, i] = inputs.unseen[2 * k + axis, i]
+        step_to(x, flows, plan, f, p, k, constants, points, total, q, n)
         outputs_slopes(x, p, seen, n)
         for row in range(OUTPUTS):
-            size = about.weight[k] / (about.position if row < 2 else about.speed if row < 4 else about.stiffness)
+            size = constants.weight[k] / (
+                constants.position if row < 2 else constants.speed if row < 4 else constants.stiffness
+            )
             for i in range(n):
-                asked = given.motion[4 * k + row, i] if row < 4 else given.stiffness[2 * k + row - 4, i]
+                asked = inputs.motion[4 * k + row, i] if row < 4 else inputs.stiffness[2 * k + row - 4, i]
                 seen[row, i] = size * (seen[row, i] - asked)
         count = FLOWS * (k + 1)
         for column in range(count):
             begun, node = 0.0, column // FLOWS
             if node < k:
-                begun = 1.0 - about.kept[node] * about.kept[node]
+                begun = 1.0 - constants.kept[node] * constants.kept[node]
                 for later in range(node + 1, k):
-                    begun *= about.kept[later] * about.kept[later]
+                    begun *= constants.kept[later] * constants.kept[later]
             first = STATE * column
             own = s[first : first + STATE]
-            _tangent_step(own, column % FLOWS, begun, node == k, k, about, points, total, out, n)
+            _tangent_step(own, column % FLOWS, begun, node == k, k, constants, points, total, out, n)
             outputs_along(seen[OUTPUTS:], own, out, n)
             for row in range(OUTPUTS):
-                size = about.weight[k] / (about.position if row < 2 else about.speed if row < 4 else about.stiffness)
+                size = constants.weight[k] / (
+                    constants.position if row < 2 else constants.speed if row < 4 else constants.stiffness
+                )
                 for i in range(n):
                     slopes[OUTPUTS * column + row, i] = size * out[row, i]
                     g[column, i] += size * out[row, i] * seen[row, i]

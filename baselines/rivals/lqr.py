@@ -20,7 +20,7 @@ from scipy.linalg import solve_continuous_are
 
 from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.rivals.feedforward import Tracked
+from baselines.rivals.feedforward import Tracking
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
@@ -96,12 +96,13 @@ class Constants(Numbers):
 
 
 @kernel
-def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: Integrals, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, m s, on."""
-    tracked, pressure, opening, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    tracked, p = Tracking(seen.intermediate[: Tracking.size]), constants.rig
+    pressure, opening = seen.pressure, seen.opening
     setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
-    lowest, step, zone, c4 = about.lowest, about.step, about.dead_zone, about.pneumatic_gain
+    lowest, step, zone, c4 = constants.lowest, constants.step, constants.dead_zone, constants.pneumatic_gain
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
         ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
@@ -109,8 +110,8 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
             place = (needed.kappa[i] - lowest) / step
-            k1, k2 = scheduled(about.table, gain, place), scheduled(about.table, gain + 1, place)
-            k3, k4 = scheduled(about.table, gain + 2, place), scheduled(about.table, gain + 3, place)
+            k1, k2 = scheduled(constants.table, gain, place), scheduled(constants.table, gain + 1, place)
+            k3, k4 = scheduled(constants.table, gain + 2, place), scheduled(constants.table, gain + 3, place)
             error, excess = y - wanted.position[cylinder, i], pp * ap - pn * an - needed.force[cylinder, i]
             summed = held(memory, cylinder, i, -k4 * excess / k1)
             wish = k1 * summed + k2 * error + k3 * (v - wanted.speed[cylinder, i]) + k4 * excess
@@ -120,7 +121,7 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             opened = two_valve_openings(rate, stiffness_rate, air, p)
             opening[row, i], opening[row + 1, i] = opened
             slope = beyond(error, zone / scale)
-            carry_on(memory, cylinder, i, summed, slope, about.period, opened)
+            carry_on(memory, cylinder, i, summed, slope, constants.period, opened)
     return 0
 
 

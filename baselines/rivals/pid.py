@@ -16,7 +16,7 @@ second started from what the first had found:
 from typing import ClassVar
 
 from baselines.admittance.law import beyond
-from baselines.rivals.feedforward import Tracked
+from baselines.rivals.feedforward import Tracking
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import CylinderAir, air_at, driving_flows
 from birthsim_env.loop.rows import Seen
@@ -59,12 +59,13 @@ class Constants(Numbers):
 
 
 @kernel
-def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: Integrals, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, N, on."""
-    tracked, pressure, opening, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    tracked, p = Tracking(seen.intermediate[: Tracking.size]), constants.rig
+    pressure, opening = seen.pressure, seen.opening
     setpoint = seen.asked.pneumatic_stiffness
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
-    bandwidth, damping, zone = about.bandwidth, about.damping, about.dead_zone
+    bandwidth, damping, zone = constants.bandwidth, constants.damping, constants.dead_zone
     index, gas_t = p.index, p.gas * p.temperature
     low, high = p.atmosphere, p.supply
     for cylinder in range(2):
@@ -82,14 +83,14 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             given = max(least, min(most, force))
             air = air_at(cylinder, pp, pn, y, v, p)
             pp_set, pn_set = pressure_setpoints(given, setpoint[cylinder, i], air, index, low, high)
-            flow_p = flow_for(about.pressure_gain * (pp_set - pp), pp, ap, air.length_p, v, index, gas_t)
-            flow_n = flow_for(about.pressure_gain * (pn_set - pn), pn, an, air.length_n, -v, index, gas_t)
+            flow_p = flow_for(constants.pressure_gain * (pp_set - pp), pp, ap, air.length_p, v, index, gas_t)
+            flow_n = flow_for(constants.pressure_gain * (pn_set - pn), pn, an, air.length_n, -v, index, gas_t)
             (fill_p, drain_p), (fill_n, drain_n) = driving_flows(pp, p), driving_flows(pn, p)
             opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p.conductance, p.leakage)
             opening_n = valves.opening_for_flow(flow_n, fill_n, drain_n, p.conductance, p.leakage)
             opening[row, i], opening[row + 1, i] = opening_p, opening_n
-            rate = spring * about.integral_rate * beyond(error, zone / scale) if given == force else 0.0
-            carry_on(memory, cylinder, i, summed, rate, about.period, (opening_p, opening_n))
+            rate = spring * constants.integral_rate * beyond(error, zone / scale) if given == force else 0.0
+            carry_on(memory, cylinder, i, summed, rate, constants.period, (opening_p, opening_n))
     return 0
 
 

@@ -16,15 +16,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import knowledge
-from baselines.admittance.rows import Beliefs, Known, Memory
+from baselines.admittance import estimator
+from baselines.admittance.rows import Estimate, EstimatorParameters, Memory
 from baselines.controller import checked_gains, require_stiffness
 from baselines.estimation import admittance, reference_friction
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Impedance, mass_spring_damper
-from baselines.rivals.horizon import FLOWS, GENERATED, HALF, NODES, SIZE, Horizon, Situation, programme
+from baselines.rivals.horizon import FLOWS, GENERATED, HALF, NODES, SIZE, Horizon, HorizonInputs, programme
 from baselines.rivals.quadratic import minimise, slope
-from baselines.staged import LawStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from baselines.valve_inverse import flow_ranges, openings_for_flows
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Measurement, Point, Reference
@@ -49,44 +49,44 @@ LAST = 3.0
 """Weight of the last node, which stands for the time beyond the horizon; assumed."""
 
 
-class Constants(Beliefs):
+class Constants(EstimatorParameters):
     """Of the stage."""
 
     horizon = part(Horizon, "of the plan")
 
 
 @helper
-def foresee(seen: Seen, memory: Memory, known: Known, about: Constants, given: Situation) -> None:
-    """Writes all of ``given`` but the present flows: friction follows the motion, what was observed besides stays."""
-    ticks, steps, n = about.horizon.tick, about.horizon.step, memory.fresh.shape[0]
+def predict_horizon(seen: Seen, memory: Memory, estimate: Estimate, constants: Constants, inputs: HorizonInputs) -> None:
+    """Writes all of ``inputs`` but the present flows: friction follows the motion, what was observed besides stays."""
+    ticks, steps, n = constants.horizon.tick, constants.horizon.step, memory.fresh.shape[0]
     offset, bristles = Point(scratch(Point.size)[:, :n]), scratch(2)[:, :n]
-    load(memory.joints.rows, 0, n, given.joints.rows)
-    load(memory.chambers.pressure, 0, n, given.pressure)
+    load(memory.joints.rows, 0, n, inputs.joints.rows)
+    load(memory.chambers.pressure, 0, n, inputs.pressure)
     load(memory.offset.rows, 0, n, offset.rows)
-    load(known.given.force, 0, n, given.force)
+    load(estimate.inputs.force, 0, n, inputs.force)
     load(memory.bristle, 0, n, bristles)
-    admittance.forecast(offset, seen.asked, known.given.force, about.compliance, ticks, given.motion)
-    reference_friction.forecast(given.motion, about.belief.rig, steps, bristles, given.unseen)
+    admittance.forecast(offset, seen.asked, estimate.inputs.force, constants.compliance, ticks, inputs.motion)
+    reference_friction.forecast(inputs.motion, constants.model.rig, steps, bristles, inputs.unseen)
     for k in range(NODES):
         for axis in range(2):
             row = 2 * k + axis
             for i in range(n):
-                observed = known.unseen[axis, i] - known.given.believed[axis, i]
-                given.unseen[row, i] = observed - about.friction_fraction * given.unseen[row, i]
-                given.stiffness[row, i] = (
+                observed = estimate.unseen[axis, i] - estimate.inputs.believed[axis, i]
+                inputs.unseen[row, i] = observed - constants.friction_fraction * inputs.unseen[row, i]
+                inputs.stiffness[row, i] = (
                     seen.asked.pneumatic_stiffness[axis, i]
-                    + about.belief.period * ticks[k] * seen.asked.pneumatic_stiffness_rate[axis, i]
+                    + constants.model.period * ticks[k] * seen.asked.pneumatic_stiffness_rate[axis, i]
                 )
 
 
 @helper
-def improve(plan: Array, given: Situation, low: Array, high: Array, about: Constants, n: int) -> None:
+def improve(plan: Array, inputs: HorizonInputs, low: Array, high: Array, constants: Constants, n: int) -> None:
     """A Gauss-Newton step of ``plan`` (SIZE, n) within flows (FLOWS, n); no flow in a lane without numbers."""
     h, g, c, p = scratch(HALF), scratch(SIZE), scratch(SIZE), scratch(PARAMETERS)
     for row in range(PARAMETERS):
         for i in range(n):
-            p[row, i] = about.belief.rig.rows[row]
-    programme(plan, given, p, about.horizon, h, g, n)
+            p[row, i] = constants.model.rig.rows[row]
+    programme(plan, inputs, p, constants.horizon, h, g, n)
     for row in range(SIZE):
         for i in range(n):
             c[row, i] = 0.0
@@ -109,21 +109,21 @@ def improve(plan: Array, given: Situation, low: Array, high: Array, about: Const
 
 
 @kernel
-def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are not positive definite."""
-    whole = block(memory, SIZE + int(about.rows_of_memory))
-    signals, known = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n])
+    whole = block(memory, SIZE + int(constants.rows_of_memory))
+    signals, estimate = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n])
     plan, own = whole[:SIZE], Memory(whole[SIZE:, :n])
-    given, low, high = Situation(scratch(Situation.size)[:, :n]), scratch(FLOWS)[:, :n], scratch(FLOWS)[:, :n]
-    missed = knowledge.know(signals, own, known, about)
-    foresee(signals, own, known, about, given)
-    flow_ranges(given.pressure, own.chambers.spool, about.belief.rig, low, high, given.flow)
-    improve(plan, given, low, high, about, n)
-    openings_for_flows(plan[:FLOWS, :n], given.pressure, about.belief.rig, own.chambers.opening)
+    inputs, low, high = HorizonInputs(scratch(HorizonInputs.size)[:, :n]), scratch(FLOWS)[:, :n], scratch(FLOWS)[:, :n]
+    missed = estimator.estimate(signals, own, estimate, constants)
+    predict_horizon(signals, own, estimate, constants, inputs)
+    flow_ranges(inputs.pressure, own.chambers.spool, constants.model.rig, low, high, inputs.flow)
+    improve(plan, inputs, low, high, constants, n)
+    openings_for_flows(plan[:FLOWS, :n], inputs.pressure, constants.model.rig, own.chambers.opening)
     load(own.chambers.opening, 0, n, signals.opening)
     # The plan as the next period will see it: each step's flow moves towards that of the next.
     for k in range(NODES - 1):
-        fraction = about.belief.period / about.horizon.step[k]
+        fraction = constants.model.period / constants.horizon.step[k]
         for row in range(FLOWS * k, FLOWS * (k + 1)):
             for i in range(n):
                 plan[row, i] += fraction * (plan[row + FLOWS, i] - plan[row, i])
@@ -179,7 +179,7 @@ class NonlinearMPC(StagedController):
         """The mass, damper and spring of the admittance, over N lanes."""
         return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         rig, gains = self.parameters, self._gains["lab" if sampled else "ideal"]
         period, tau = rig.electronics.control_period, rig.valves.time_constant
         periods = np.maximum(np.round(np.array(STEPS) / period), 1)
@@ -192,8 +192,8 @@ class NonlinearMPC(StagedController):
             position=self.POSITION_TOLERANCE,
             **{name: gains[f"{name}_tolerance"] for name in ("speed", "stiffness", "flow")},
         )
-        about = Constants.numbers(**knowledge.beliefs(rig, sampled, sampled, gains), horizon=horizon)
-        return [LawStage(control, about, np.concatenate([np.zeros(SIZE), knowledge.fresh_memory(rig, sampled)]))]
+        constants = Constants.numbers(**estimator.estimator_parameters(rig, sampled, sampled, gains), horizon=horizon)
+        return [ControllerStage(control, constants, np.concatenate([np.zeros(SIZE), estimator.fresh_memory(rig, sampled)]))]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         require_stiffness(reference, 0.0)

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.rivals.feedforward import Tracked
+from baselines.rivals.feedforward import Tracking
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
@@ -40,13 +40,14 @@ class Constants(Numbers):
 
 
 @kernel
-def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: Integrals, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, m s, on."""
-    tracked, pressure, opening, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    tracked, p = Tracking(seen.intermediate[: Tracking.size]), constants.rig
+    pressure, opening = seen.pressure, seen.opening
     setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
-    r, reaching, inside = about.surface_rate, about.reaching_rate, about.layer_rate
-    zone, c4 = about.dead_zone, about.pneumatic_gain
+    r, reaching, inside = constants.surface_rate, constants.reaching_rate, constants.layer_rate
+    zone, c4 = constants.dead_zone, constants.pneumatic_gain
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
@@ -68,7 +69,7 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness_of(air, p) - setpoint[cylinder, i])
             opened = two_valve_openings(rate, stiffness_rate, air, p)
             opening[row, i], opening[row + 1, i] = opened
-            carry_on(memory, cylinder, i, summed, slope, about.period, opened)
+            carry_on(memory, cylinder, i, summed, slope, constants.period, opened)
     return 0
 
 

@@ -10,7 +10,7 @@ from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.stages import compliant_motion, pistons
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.feedforward import feedforward
-from baselines.staged import LawStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.records import Numbers, Rows, rows
@@ -81,10 +81,10 @@ class TrackingController(StagedController, ABC):
     def _design(self, gains: dict[str, float]) -> dict[str, Any]:
         """The constants of ``LAW`` that come from the gains, all those of ``GAINS``."""
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         rig, gains, design = self.parameters, self._gains[sampled], self._designs[sampled]
-        about = self.CONSTANTS.numbers(period=rig.electronics.control_period, rig=self._p, **design)
-        law = LawStage(self.LAW, about, Integrals.lane(fresh=1.0))
+        constants = self.CONSTANTS.numbers(period=rig.electronics.control_period, rig=self._p, **design)
+        law = ControllerStage(self.LAW, constants, Integrals.lane(fresh=1.0))
         ahead = feedforward(rig, gains["friction_fraction"])
         return [compliant_motion(rig), pistons(rig, sampled, informed=True), ahead, law]
 

@@ -80,11 +80,13 @@ def _in_processes(work: Work, pieces: Pieces, jobs: int) -> Outcomes:
             raise OSError("a process that computed has died, of lack of memory perhaps; what is complete is kept") from error
 
 
-def _hear(before: Callable[[threading.ExceptHookArgs], object], about: threading.ExceptHookArgs) -> None:
+def _hear(before: Callable[[threading.ExceptHookArgs], object], constants: threading.ExceptHookArgs) -> None:
     """joblib's manager of processes looks up pieces that it has just cancelled, which now and then ends it with a ``KeyError``;
     its processes have ended by then."""
-    if not (about.exc_type is KeyError and about.thread is not None and about.thread.name == "ExecutorManagerThread"):
-        before(about)
+    if not (
+        constants.exc_type is KeyError and constants.thread is not None and constants.thread.name == "ExecutorManagerThread"
+    ):
+        before(constants)
 
 
 @contextmanager

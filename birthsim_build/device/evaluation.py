@@ -12,7 +12,7 @@ from baselines.bench.evaluation import AT_ONCE, Evaluation, times_of
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import figures_of
-from baselines.controller import Controller, Law, controller_of
+from baselines.controller import CommandFunction, Controller, controller_of
 from baselines.staged import driving
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
@@ -26,7 +26,7 @@ from birthsim_env.physics.rig.parameters import load_parameters
 def evaluate_on(
     device: str,
     environment: str,
-    controller: Controller | Law,
+    controller: Controller | CommandFunction,
     name: str,
     episodes: int,
     seed: int,

@@ -87,7 +87,7 @@ class Limits(Numbers):
     period = number("s", "control period")
 
 
-class Kept(Rows):
+class LastGood(Rows):
     """What the first stage remembers."""
 
     good = rows(_ROWS, "SI", "last good number, by row of ``Signals``")
@@ -98,7 +98,7 @@ class Kept(Rows):
     ended = row("1", "1 where the control has ended")
 
 
-class Found(Rows):
+class MissingSignals(Rows):
     """What a lane is found to lack."""
 
     bad = rows(_COUNT, "1", "1 where a signal is not good")
@@ -106,14 +106,14 @@ class Found(Rows):
 
 
 @helper
-def _replace(signals: Array, bad: Array, kept: Kept, about: Limits, n: int) -> None:
+def _replace(signals: Array, bad: Array, kept: LastGood, constants: Limits, n: int) -> None:
     """Puts the last good signal in the place of what is ``bad``, and counts."""
     for k in range(_ROWS):
         signal = _SIGNAL[k]
         for i in range(n):
             signals[k, i] = kept.good[k, i] if bad[signal, i] > 0.0 else signals[k, i]
     for signal in range(_COUNT):
-        needed = about.needed[signal]
+        needed = constants.needed[signal]
         for i in range(n):
             age = kept.age[signal, i] + 1.0 if bad[signal, i] > 0.0 else 0.0
             kept.age[signal, i] = age
@@ -122,11 +122,11 @@ def _replace(signals: Array, bad: Array, kept: Kept, about: Limits, n: int) -> N
         worst, oldest, late = 0.0, 0.0, 0.0
         for signal in range(_COUNT):
             worst, late = max(worst, bad[signal, i]), max(late, kept.age[signal, i])
-            oldest = max(oldest, kept.age[signal, i] if about.needed[signal] > 0.0 else 0.0)
+            oldest = max(oldest, kept.age[signal, i] if constants.needed[signal] > 0.0 else 0.0)
         kept.missed[i] += worst
         kept.late[i] = min(late, 1.0)
         kept.waits[i] = 1.0 if oldest == np.inf else 0.0
-        kept.ended[i] = max(kept.ended[i], 1.0 if oldest > about.patience and oldest < np.inf else 0.0)
+        kept.ended[i] = max(kept.ended[i], 1.0 if oldest > constants.patience and oldest < np.inf else 0.0)
 
 
 @helper
@@ -136,19 +136,19 @@ def _is_at_pivot(x: float, y: float) -> float:
 
 
 @kernel
-def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lane: int, n: int) -> int:
+def let_pass(world: int, seen: Seen, kept: LastGood, constants: Limits, tables: int, lane: int, n: int) -> int:
     """Replaces what is not good; returns how many lanes are asked for something that is not."""
-    signals, found, refused = seen.rows[:_ROWS], Found(scratch(Found.size)), 0
+    signals, found, refused = seen.rows[:_ROWS], MissingSignals(scratch(MissingSignals.size)), 0
     bad = found.bad
     for i in range(n):
         found.any[i] = kept.late[i]
         # What stands in for a clock that fails.
-        kept.good[_CLOCK, i] += about.period
+        kept.good[_CLOCK, i] += constants.period
     for signal in range(_COUNT):
         for i in range(n):
             bad[signal, i] = 0.0
     for k in range(_ROWS):
-        signal, most = _SIGNAL[k], about.most[k]
+        signal, most = _SIGNAL[k], constants.most[k]
         for i in range(n):
             # A comparison with what is not a number is false.
             beyond = 0.0 if abs(signals[k, i]) <= most else 1.0
@@ -165,7 +165,7 @@ def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lan
         some = max(some, found.any[i])
         refused += 1 if bad[_ASKED, i] > 0.0 else 0
     if some > 0.0:
-        _replace(signals, bad, kept, about, n)
+        _replace(signals, bad, kept, constants, n)
     for k in range(_ROWS):
         for i in range(n):
             kept.good[k, i] = signals[k, i]
@@ -175,11 +175,11 @@ def let_pass(world: int, seen: Seen, kept: Kept, about: Limits, tables: int, lan
 
 
 @kernel
-def end(world: int, seen: Seen, memory: int, about: Limits, tables: int, lane: int, n: int) -> int:
+def end(world: int, seen: Seen, memory: int, constants: Limits, tables: int, lane: int, n: int) -> int:
     """Closes the valves of lanes that wait for a first sample, and opens them as the owner chose where control has ended."""
     for valve in range(4):
         for i in range(n):
-            still = 0.0 if seen.fault[i] == 1.0 else about.opening
+            still = 0.0 if seen.fault[i] == 1.0 else constants.opening
             seen.opening[valve, i] = seen.opening[valve, i] if seen.fault[i] == 0.0 else still
     return 0
 
@@ -211,7 +211,7 @@ def limits(rig: Parameters, reads: Iterable[str], on_fault: str, fault_time: flo
 
 
 def fresh(rig: Parameters) -> Array:
-    """What a lane (``Kept.size``,) remembers where it starts: what stands in for a signal that was not good yet.
+    """What a lane (``LastGood.size``,) remembers where it starts: what stands in for a signal that was not good yet.
 
     The end effector rests at the centre of its workspace, and is asked to.
     """
@@ -219,7 +219,7 @@ def fresh(rig: Parameters) -> Array:
     pressure = 0.5 * (rig.air.supply_pressure + rig.air.atmospheric_pressure)
     reference = Reference.lane(position=[x, y], stiffness=STIFFNESS, pneumatic_stiffness=PNEUMATIC)
     good = Signals.lane(position=[x, y], pressure=pressure, reference=reference)
-    return Kept.lane(good=good, age=np.inf, late=1.0, waits=1.0)
+    return LastGood.lane(good=good, age=np.inf, late=1.0, waits=1.0)
 
 
 def require_good(reference: Reference) -> None:

@@ -33,7 +33,7 @@ class Feedforward(Rows):
     rate = rows("rate1 rate2", "N/s", "rate of that force")
 
 
-MOST_ACTIONS, MOST_SHOWN, MOST_HANDED = 64, 64, 32
+MOST_ACTIONS, MOST_SHOWN, MOST_INTERMEDIATE = 64, 64, 32
 """Longest action, most that an actuation shows of its memory, and most rows that a law's stages hand on."""
 
 
@@ -59,7 +59,9 @@ class Seen(Signals):
     action = rows(MOST_ACTIONS, "1", "the policy's action")
     opening = rows("opening_P1 opening_N1 opening_P2 opening_N2", "1", "commanded opening of a valve, -1 to 1")
     shown = rows(MOST_SHOWN, "1", "what an actuation shows a policy of its memory")
-    handed = rows(MOST_HANDED, "SI", "what stages of a law hand on to the next ones in a period; the law names its rows")
+    intermediate = rows(
+        MOST_INTERMEDIATE, "SI", "what stages of a law hand on to the next ones in a period; the law names its rows"
+    )
     missed = row("1", "control periods in which a signal that the controller reads was replaced by the last good one")
     fault = row("1", "0: none; 1: no good signal yet, valves closed; 2: the control has ended, see ``loop.guard``")
 
@@ -69,7 +71,10 @@ SINCE_JUMP, TICK, WORLD = World.since_jump.first, World.tick.first, World.size
 TIME, POSITION, ACCELERATION, PRESSURE = (one.first for one in (Seen.time, Seen.position, Seen.acceleration, Seen.pressure))
 REFERENCE = Seen.reference.first
 ASKED, FEEDFORWARD, DAMPING, ACTION = (one.first for one in (Seen.asked, Seen.feedforward, Seen.damping_factor, Seen.action))
-OPENING, SHOWN, HANDED, FAULT, SEEN = *(one.first for one in (Seen.opening, Seen.shown, Seen.handed, Seen.missed)), Seen.size
+OPENING, SHOWN, INTERMEDIATE, FAULT, SEEN = (
+    *(one.first for one in (Seen.opening, Seen.shown, Seen.intermediate, Seen.missed)),
+    Seen.size,
+)
 """Numbers of rows, for arrays that a loop places."""
 
 

@@ -91,7 +91,7 @@ class Reference(Motion, Setpoints):
 
 
 @helper
-def given_way(reference: Reference, fx: float, fy: float, i: int) -> tuple[float, float]:
+def compliant_offset(reference: Reference, fx: float, fy: float, i: int) -> tuple[float, float]:
     """What a force, N, displaces the compliant target of lane ``i`` by (19), m."""
     kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
     return compliance(fx, fy, kx, ky, kxy)

@@ -104,14 +104,14 @@ class Joints(Rows):
     velocity = rows("v1 v2", "m/s", "of the pistons")
 
 
-class Described(Numbers):
+class NominalRig(Numbers):
     """The rig as described, by whose geometry the pistons are put."""
 
     rig = part(Rig, "as described")
 
 
 @helper
-def _settle(world: World, seen: Seen, own: Start, about: Described, n: int) -> None:
+def _settle(world: World, seen: Seen, own: Start, constants: NominalRig, n: int) -> None:
     """Put the pistons on the target, or where they are to start, the chambers in balance."""
     motion, joints, asked = Point(scratch(Point.size)), Joints(scratch(Joints.size)), seen.reference
     for i in range(n):
@@ -119,7 +119,7 @@ def _settle(world: World, seen: Seen, own: Start, about: Described, n: int) -> N
         for axis in range(2):
             motion.position[axis, i] = own.place[axis, i] if elsewhere else asked.position[axis, i]
             motion.velocity[axis, i] = 0.0 if elsewhere else asked.velocity[axis, i]
-    piston_motion(motion.rows, about.rig, joints.rows, n)
+    piston_motion(motion.rows, constants.rig, joints.rows, n)
     for i in range(n):
         world.state[Y1, i], world.state[Y2, i] = joints.position[0, i], joints.position[1, i]
         world.state[V1, i], world.state[V2, i] = joints.velocity[0, i], joints.velocity[1, i]
@@ -128,8 +128,8 @@ def _settle(world: World, seen: Seen, own: Start, about: Described, n: int) -> N
 
 
 @kernel
-def _start(world: World, seen: Seen, own: Start, about: Described, tables: int, lane: int, n: int) -> int:
-    _settle(world, seen, own, about, n)
+def _start(world: World, seen: Seen, own: Start, constants: NominalRig, tables: int, lane: int, n: int) -> int:
+    _settle(world, seen, own, constants, n)
     return 0
 
 
@@ -149,11 +149,11 @@ def start_stages(start: Array, nominal: Array, plant: Stage) -> list[Stage]:
 
     ``start`` (``Start.size``, N) is ``Start``, ``nominal`` (PARAMETERS,) the rig as described.
     """
-    first = Stage(_start, Described.numbers(rig=nominal), start)
+    first = Stage(_start, NominalRig.numbers(rig=nominal), start)
     return [first, Stage(_rest, memory=plant.memory)] if plant.function is _optional_plant else [first]
 
 
-class Before(Rows):
+class PreviousSetpoints(Rows):
     """Force and setpoints a period ago."""
 
     force = rows("force_x force_y", "N", "of the hand")
@@ -161,7 +161,7 @@ class Before(Rows):
     stiffness_coupling = row("N/m", "what couples x and y")
 
 
-class Jumps(Numbers):
+class JumpDetection(Numbers):
     """What counts as a jump."""
 
     period = number("s", "control period")
@@ -170,16 +170,18 @@ class Jumps(Numbers):
 
 
 @kernel
-def _jumps(world: World, seen: Seen, before: Before, about: Jumps, tables: int, lane: int, n: int) -> int:
+def _jumps(
+    world: World, seen: Seen, before: PreviousSetpoints, constants: JumpDetection, tables: int, lane: int, n: int
+) -> int:
     force, asked = world.force, seen.reference
     for i in range(n):
         jumped = False
         for axis in range(2):
-            jumped = jumped or abs(force[axis, i] - before.force[axis, i]) > about.change
+            jumped = jumped or abs(force[axis, i] - before.force[axis, i]) > constants.change
             jumped = jumped or asked.stiffness[axis, i] != before.stiffness[axis, i]
         jumped = jumped or asked.stiffness_coupling[i] != before.stiffness_coupling[i]
-        since = 0.0 if jumped else world.since_jump[i] + about.period
-        world.since_jump[i] = world.since_jump[i] if about.begins > 0.0 else since
+        since = 0.0 if jumped else world.since_jump[i] + constants.period
+        world.since_jump[i] = world.since_jump[i] if constants.begins > 0.0 else since
         for axis in range(2):
             before.force[axis, i], before.stiffness[axis, i] = force[axis, i], asked.stiffness[axis, i]
         before.stiffness_coupling[i] = asked.stiffness_coupling[i]
@@ -189,10 +191,10 @@ def _jumps(world: World, seen: Seen, before: Before, about: Jumps, tables: int, 
 def jump_stage(period: float, jump_rate: float, memory: Array, begins: bool) -> Stage:
     """Counts the time since the force changed faster than ``jump_rate``, N/s, or a closed-loop setpoint changed at all.
 
-    ``memory`` (5, N) is ``Before``; where an episode ``begins`` it is only written.
+    ``memory`` (5, N) is ``PreviousSetpoints``; where an episode ``begins`` it is only written.
     """
-    about = Jumps.numbers(period=period, change=jump_rate * period, begins=begins)
-    return Stage(_jumps, about, memory)
+    constants = JumpDetection.numbers(period=period, change=jump_rate * period, begins=begins)
+    return Stage(_jumps, constants, memory)
 
 
 @kernel

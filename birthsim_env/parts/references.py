@@ -217,7 +217,7 @@ class Path(_Planned):
         put(self._own, lane, (*(draw(number, rng) for number in numbers), self.begins, self.ends))
 
 
-class Hold(Path):
+class FixedTarget(Path):
     """Stay at a point (x, y), m."""
 
     def __init__(self, position: tuple[Range, Range] = (0.5, 0.0)) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp, UserForce
 from birthsim_env.parts.hands.vacuum import VacuumPulls
-from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
+from birthsim_env.parts.references import Circle, FixedTarget, Path, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 
 Parts = tuple[Trajectory, UserForce, StiffnessSchedule]
@@ -50,11 +50,11 @@ PROBE_REST = 3.0
 
 
 def _probe() -> Parts:
-    return Hold(), Ramp(begins=PROBE_REST), StiffnessSchedule()
+    return FixedTarget(), Ramp(begins=PROBE_REST), StiffnessSchedule()
 
 
 def _probe_varied() -> Parts:
-    reference = Hold(((0.4, 0.6), (-0.1, 0.06)))
+    reference = FixedTarget(((0.4, 0.6), (-0.1, 0.06)))
     stiffness = StiffnessSchedule((0.0,), ((1000.0, 4000.0),), ((3000.0, 4800.0),), ((1500.0, 2400.0),))
     return reference, Ramp(amplitude=(5.0, 40.0), angle="axes", begins=PROBE_REST), stiffness
 
@@ -80,13 +80,13 @@ def _forceps() -> Parts:
     # simulated dystocia the steepest had 45 N/s, 2-249 (Crofts et al., AJOG 197:156, 2007). 4000 N/m is assumed. Compressed in
     # time: a traction lasts as long as a contraction, here 2 s.
     stiffness = StiffnessSchedule((0.0,), (4000.0,), (4200.0,), (2000.0,))
-    return Hold((0.45, 0.0)), Pulls((175.0, 175.0), rate=70.0, angle=math.radians(-10)), stiffness
+    return FixedTarget((0.45, 0.0)), Pulls((175.0, 175.0), rate=70.0, angle=math.radians(-10)), stiffness
 
 
 def _forceps_varied() -> Parts:
     stiffness = StiffnessSchedule((0.0,), (4000.0,), ((3800.0, 4400.0),), ((1800.0, 2200.0),))
     pulls = Pulls(((150.0, 200.0), (150.0, 200.0)), rate=(45.0, 100.0), angle=_degrees(-20, 20))
-    return Hold(((0.43, 0.47), (-0.03, 0.03))), pulls, stiffness
+    return FixedTarget(((0.43, 0.47), (-0.03, 0.03))), pulls, stiffness
 
 
 def _dystocia() -> Parts:

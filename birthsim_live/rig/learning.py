@@ -86,7 +86,7 @@ def write_learning(folder: Path) -> None:
         "bars": {name: (PARAMETERS + recorder.at[name]).tolist() for name in BARS},
         "at": {
             "action": first["action"], "impacts": first["impacts"], "seen": first["seen"],
-            "failed": first["ends"] + Ends.failed.first, "reward": first["terms"] + Terms.total.first,
+            "terminated": first["ends"] + Ends.terminated.first, "reward": first["terms"] + Terms.total.first,
         },
         "error": [Observation.error.first, SCALES[0]],
         "stiffness": [Observation.pneumatic_stiffness.first, Observation.pneumatic_setpoint.first, STIFFNESS],

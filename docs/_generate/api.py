@@ -17,7 +17,7 @@ BEYOND = {
     ),
     "baselines": (
         "staged.StagedController",
-        "staged.LawStage",
+        "staged.ControllerStage",
         "bench.evaluation.table",
         "rivals.symbolic.symbolic_model",
         "rivals.symbolic.SymbolicModel",

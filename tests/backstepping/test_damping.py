@@ -120,7 +120,7 @@ def test_a_negative_setpoint_is_refused() -> None:
 
 def test_lanes_without_gains_are_counted() -> None:
     """Of four lanes one has gains, two have none for either cylinder, and one for neither."""
-    needs, found = law.Needs(np.zeros((law.Needs.size, 4))), law.Gains(np.zeros((law.Gains.size, 4)))
+    needs, found = law.GainInputs(np.zeros((law.GainInputs.size, 4))), law.Gains(np.zeros((law.Gains.size, 4)))
     needs.mass[:], needs.stiffness[:] = 4.0, [[2000.0, 1.0, 2000.0, 1.0], [2000.0, 2000.0, 1.0, 1.0]]
     rig = Rig(parameter_column(Parameters()))
     assert law.equal_gains(needs, rig, found, 4) == 3

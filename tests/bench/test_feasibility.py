@@ -6,7 +6,7 @@ import pytest
 
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.feasibility import required_strength_ratio
-from birthsim_env import Circle, ForceProfile, Hold, Parameters, StiffnessSchedule, UserForce
+from birthsim_env import Circle, FixedTarget, ForceProfile, Parameters, StiffnessSchedule, UserForce
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
@@ -56,7 +56,7 @@ def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_i
     for angle in np.linspace(0, 2 * np.pi, 8, endpoint=False):
         sizes = np.linspace(0, 300, 13)
         pushes = sizes * np.array([[np.cos(angle)], [np.sin(angle)]])
-        found = required_strength_ratio(made(13, reference=Hold(tuple(place)), user_force=Steady(pushes)))
+        found = required_strength_ratio(made(13, reference=FixedTarget(tuple(place)), user_force=Steady(pushes)))
         expected = []
         for push in pushes.T:
             # The most of the whole episode: the weight alone at its start, or the hand's full force.

@@ -64,5 +64,5 @@ def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
     about = json.loads((tmp_path / "out" / "circle_ideal_pid.json").read_text())
     assert about["words_of_data"] == words[threads.ROWS]
     assert about["rows"]["rig_mass"] == 8
-    assert {"y1", "measured_x", "reward", "failed", "tracking_error1"} <= about["rows"].keys()
+    assert {"y1", "measured_x", "reward", "terminated", "tracking_error1"} <= about["rows"].keys()
     assert max(about["rows"].values()) < words[threads.ROWS]

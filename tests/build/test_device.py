@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from baselines import evaluate, make_controller
-from baselines.controller import PlainLaw
+from baselines.controller import PlainController
 from birthsim_build.device import machine
 from birthsim_build.device.evaluation import evaluate_on
 from birthsim_env import ForceProfile, Parameters, StiffnessSchedule, Trajectory
@@ -154,7 +154,7 @@ class Still(Trajectory):
         return np.repeat([[0.5], *[[0.0]] * 7], len(time), axis=1)
 
 
-class Asleep(PlainLaw):
+class Asleep(PlainController):
     """A user's controller."""
 
 

@@ -14,7 +14,7 @@ def test_rows_are_those_of_the_loop():
         "time": "time", "measured_x": "position", "measured_vx": "velocity", "position_time": "position_time",
         "measured_ax": "acceleration", "measured_Pp1": "pressure", "measured_force_x": "user_force", "reference_x": "reference",
         "asked_x": "asked", "feedforward_force1": "feedforward", "damping_factor": "damping_factor", "action": "action",
-        "opening_P1": "opening", "shown": "shown", "handed": "handed",
+        "opening_P1": "opening", "shown": "shown", "intermediate": "intermediate",
     }  # fmt: skip
     for begins, layout, names in ((0, World, world), (WORLD, Seen, seen)):
         for name, group in names.items():

@@ -239,4 +239,4 @@ def test_the_rule_covers_every_row_that_is_measured_or_asked_for():
     assert limits.most.shape == (Signals.size,)
     assert (limits.most > 0).all()
     assert np.isfinite(limits.most).all()
-    assert np.abs(guard.Kept(guard.fresh(RIG)).good / limits.most).max() <= 1
+    assert np.abs(guard.LastGood(guard.fresh(RIG)).good / limits.most).max() <= 1

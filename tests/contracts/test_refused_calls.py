@@ -11,7 +11,7 @@ from agents.training.sb3.shifted_reward import ShiftedReward
 from baselines import BacksteppingController, make_controller
 from baselines.controller import checked_command
 from baselines.identification.experiment import propose
-from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
+from birthsim_env import Circle, FixedTarget, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.loop.loop import Loop
@@ -132,7 +132,7 @@ TABLE = {
     ("size", "other names"): [lambda: type("Wrong", (Rows,), {"size": row("m", "")})],
     ("(319, 240)", "320 x 240"): [lambda: Renderer(RIG, 319, 240)],
     **{
-        (f"({x:g}, {y:g}) m is unreachable", "distance 0.3 to 0.7 m from the pivot"): [started(reference=Hold((x, y)))]
+        (f"({x:g}, {y:g}) m is unreachable", "distance 0.3 to 0.7 m from the pivot"): [started(reference=FixedTarget((x, y)))]
         for x, y in ((0.8, 0.0), (0.25, 0.0), (0.5, 0.4), (0.3, -0.5), (-0.5, 0.0))
     },
     ("reference at ", "distance"): [
@@ -141,8 +141,8 @@ TABLE = {
             make(reference=path)
             for make in (env, lanes)
             for path in (
-                Circle(radius=(0.05, 0.21)), Hold(((0.45, 0.71), 0.0)), Hold((0.5, (-0.5, 0.0))),
-                Hold(((0.295, 0.4), (-0.1, 0.2))), Path((0.5, 0.0), 0.0, (0.05, 0.25)),
+                Circle(radius=(0.05, 0.21)), FixedTarget(((0.45, 0.71), 0.0)), FixedTarget((0.5, (-0.5, 0.0))),
+                FixedTarget(((0.295, 0.4), (-0.1, 0.2))), Path((0.5, 0.0), 0.0, (0.05, 0.25)),
                 Path((0.5, 0.0), (-3.0, 3.0), 0.21, ends=2.0),
             )
         ),

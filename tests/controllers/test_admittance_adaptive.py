@@ -105,7 +105,7 @@ def test_a_head_heavier_than_five_kilograms_rests_with_less_gain(mass, rest_gain
     rig = RIG.replace({"mechanics.mass": mass})
 
     def told(name, sampled, **gains):
-        return Constants(make_controller(name, rig, **gains).law_stages(sampled)[0].constants).gains.rest_gain
+        return Constants(make_controller(name, rig, **gains).controller_stages(sampled)[0].constants).gains.rest_gain
 
     assert told("admittance-adaptive", True) == pytest.approx(rest_gain, rel=1e-12)
     assert told("admittance-adaptive", True, rest_gain=50.0) == 50.0, "a gain that is asked for is what it has"

@@ -5,10 +5,10 @@ import pytest
 
 from baselines.admittance import law as admittance_law
 from baselines.admittance.controller import LEAST_FRACTION
-from baselines.admittance.knowledge import fresh_memory
-from baselines.admittance.rows import Gains, Known, Memory
-from baselines.estimation.observers import belief
-from baselines.estimation.rows import Belief
+from baselines.admittance.estimator import fresh_memory
+from baselines.admittance.rows import Estimate, Gains, Memory
+from baselines.estimation.observers import assumed_parameters
+from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.compiled.lanes import SPOOLS, Array
@@ -50,17 +50,22 @@ def commanded(
 ):
     """Openings (4, N) of the kernel; without ``lead_time`` and with shut spools they are those that the law wants."""
     lanes = motion.shape[1]
-    seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))
+    seen, estimate = Seen(np.zeros((Seen.size, lanes))), Estimate(np.zeros((Estimate.size, lanes)))
     memory = remembered(lanes) if memory is None else memory
-    memory.inertia.mass[:], known.given.inverse_mass[:] = rig.mechanics.mass, 1.0 / rig.mechanics.mass
+    memory.inertia.mass[:], estimate.inputs.inverse_mass[:] = rig.mechanics.mass, 1.0 / rig.mechanics.mass
     seen.asked.rows[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
     memory.joints.position[:], memory.joints.speed[:], memory.chambers.pressure[:] = now.piston, now.speed, now.pressures
     memory.chambers.spool[:], memory.pistons.rest[:], seen.feedforward.rows[:] = spools, rest, told
-    known.motion.rows[:], known.given.force[:], known.unseen[:], known.given.moving[:] = motion, user, unseen, moving
+    estimate.motion.rows[:], estimate.inputs.force[:], estimate.unseen[:], estimate.inputs.moving[:] = (
+        motion,
+        user,
+        unseen,
+        moving,
+    )
     # A spool that follows as fast as it does by itself is told where to go, no further.
     quickness = 1 - np.exp(-PERIOD / (lead_time or rig.valves.time_constant))
     numbers = Gains.numbers(quickness=quickness, **(REST | gains))
-    admittance_law.command(seen, memory, known, Gains(numbers), Belief(belief(rig)))
+    admittance_law.command(seen, memory, estimate, Gains(numbers), AssumedParameters(assumed_parameters(rig)))
     return seen.opening
 
 
@@ -171,7 +176,7 @@ def watched(errors: Array, fall: float = 0.9, most: float = 1.0) -> Array:
     """The gain fraction after each of the speed errors (T,), one per period."""
     gains = Gains(Gains.lane(oscillation=0.06, swing=0.0, yielding=fall, least_fraction=0.35, most_falls=most))
     one = remembered(1).follower.along
-    return np.array([admittance_law.watch(one, 0, float(error), PERIOD, gains) for error in errors])
+    return np.array([admittance_law.gain_fraction(one, 0, float(error), PERIOD, gains) for error in errors])
 
 
 TIMES = PERIOD * np.arange(2000)

@@ -5,7 +5,7 @@ import pytest
 
 from baselines.admittance import law
 from baselines.admittance.controller import AdmittanceController
-from baselines.admittance.rows import Gains, HalfWave, Known, Memory
+from baselines.admittance.rows import Estimate, Gains, HalfWave, Memory
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.controllers.test_admittance_backstepping import PERIOD, TIMES, answer, commanded, near, remembered
 from tests.oracles import closed_loop, rigid_body
@@ -66,23 +66,23 @@ def test_half_waves_count_where_they_go_beyond_the_level_within_a_fifth_of_a_sec
 
 
 def test_swings_at_rest_lower_the_gain_to_no_less_than_055_and_it_comes_back_in_04_s() -> None:
-    one, gains = remembered(1).follower.calm_along, Gains(Gains.lane(swing=0.02))
+    one, gains = remembered(1).follower.rest_along, Gains(Gains.lane(swing=0.02))
     swing = np.concatenate([0.03 * np.sin(2 * np.pi * 14 * TIMES[:1000]), np.zeros(800)])
-    fraction = np.array([law.calm(one, 0, error, PERIOD, gains) for error in swing])
+    fraction = np.array([law.rest_gain_fraction(one, 0, error, PERIOD, gains) for error in swing])
     assert fraction[np.argmax(fraction < 1)] == 0.85
     assert fraction.min() == 0.55
     np.testing.assert_allclose(1 - fraction[1000:], (1 - fraction[1000]) * np.exp(-TIMES[:800] / 0.4), rtol=0.005)
-    one, gains = remembered(1).follower.calm_along, Gains(Gains.lane(swing=0.04))
-    assert all(law.calm(one, 0, error, PERIOD, gains) == 1.0 for error in swing), "no swing within the level"
+    one, gains = remembered(1).follower.rest_along, Gains(Gains.lane(swing=0.04))
+    assert all(law.rest_gain_fraction(one, 0, error, PERIOD, gains) == 1.0 for error in swing), "no swing within the level"
 
 
 @pytest.mark.parametrize("speed", [0.005, 0.02])
 def test_a_motion_goes_somewhere_by_the_square_of_its_mean_velocity_over_8_mm_s(speed: float) -> None:
     """The mean of a third of a second."""
-    follower, motion = remembered(1).follower, Known(np.zeros((Known.size, 1))).motion
+    follower, motion = remembered(1).follower, Estimate(np.zeros((Estimate.size, 1))).motion
     motion.velocity[:, 0] = 0.6 * speed, -0.8 * speed
     mean = speed * (1 - np.exp(-3 * TIMES[1:]))
-    found = [law.going(follower, 0, motion, PERIOD) for _ in mean]
+    found = [law.motion_fraction(follower, 0, motion, PERIOD) for _ in mean]
     np.testing.assert_allclose(found, np.minimum(1, (mean / 0.008) ** 2), rtol=0.01)
 
 
@@ -92,7 +92,7 @@ def test_the_gain_is_calmed_as_far_as_the_motion_goes_nowhere(mean: float, gone:
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
     pose, follower = rigid_body.pose_of(now.piston, rig), memory.follower
     follower.drift[:, 0] = 0.6 * mean, -0.8 * mean
-    follower.calm_across.fraction[:], follower.calm_along.fraction[:] = 0.7, 0.6
+    follower.rest_across.fraction[:], follower.rest_along.fraction[:] = 0.7, 0.6
     for way, fraction in ((pose.across, 0.7), (pose.beam, 0.6)):
         left = c * (gone + (1 - gone) * fraction)
         assert answer(rig, now, way, memory, c, swing=0.02) == pytest.approx(left**3 + 2 * left, rel=0.01)

@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from baselines.admittance import knowledge
-from baselines.admittance.knowledge import BELIEVED_LIMIT
-from baselines.admittance.rows import Known, Memory
+from baselines.admittance import estimator
+from baselines.admittance.estimator import BELIEVED_LIMIT
+from baselines.admittance.rows import Estimate, Memory
 from baselines.estimation.admittance import MOVING_SPEED
-from baselines.rivals.horizon import NODES, Horizon, Situation
+from baselines.rivals.horizon import NODES, Horizon, HorizonInputs
 from baselines.rivals.predictive import GENERATED as GENERATED
-from baselines.rivals.predictive import Constants, foresee
-from baselines.staged import LawStage, StagedController
-from birthsim_env.loop.rows import HANDED, Seen
+from baselines.rivals.predictive import Constants, predict_horizon
+from baselines.staged import ControllerStage, StagedController
+from birthsim_env.loop.rows import INTERMEDIATE, Seen
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.loop.stage import block
 from birthsim_env.physics.compiled.compilation import kernel
@@ -38,11 +38,11 @@ either = pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
 
 
 @kernel
-def inform(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
-    """Hands on what is ``Known``."""
-    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+def inform(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
+    """Hands on what is ``Estimate``."""
+    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
     signals = Seen(seen.rows[:, :n])
-    return knowledge.know(signals, own, Known(signals.handed[: Known.size]), about)
+    return estimator.estimate(signals, own, Estimate(signals.intermediate[: Estimate.size]), constants)
 
 
 class Aware(StagedController):
@@ -52,37 +52,37 @@ class Aware(StagedController):
         super().__init__(rig)
         self._gains, self._horizon = gains, horizon
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
-        known = knowledge.beliefs(self.parameters, sampled, sampled, self._gains["lab" if sampled else "ideal"])
-        constants = Constants.numbers(**known, horizon=self._horizon.rows)
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
+        estimate = estimator.estimator_parameters(self.parameters, sampled, sampled, self._gains["lab" if sampled else "ideal"])
+        constants = Constants.numbers(**estimate, horizon=self._horizon.rows)
         self.about = Constants(constants)
-        return [LawStage(inform, constants, knowledge.fresh_memory(self.parameters, sampled))]
+        return [ControllerStage(inform, constants, estimator.fresh_memory(self.parameters, sampled))]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        self.known = Known(np.zeros((Known.size, lanes)))
-        return [(self.known.rows, HANDED)]
+        self.estimate = Estimate(np.zeros((Estimate.size, lanes)))
+        return [(self.estimate.rows, INTERMEDIATE)]
 
     @property
     def memory(self) -> Memory:
         return Memory(self._memories[0])
 
-    def foreseen(self, reference: Reference) -> Situation:
+    def predicted(self, reference: Reference) -> HorizonInputs:
         """What the planner begins with, but for the flows, and expects at the nodes of its horizon."""
-        lanes = self.known.drag.shape[1]
-        seen, given = Seen(np.zeros((Seen.size, lanes))), Situation(np.zeros((Situation.size, lanes)))
+        lanes = self.estimate.drag.shape[1]
+        seen, inputs = Seen(np.zeros((Seen.size, lanes))), HorizonInputs(np.zeros((HorizonInputs.size, lanes)))
         seen.asked.rows[:] = reference.rows
-        foresee(seen, self.memory, self.known, self.about, given)
-        return given
+        predict_horizon(seen, self.memory, self.estimate, self.about, inputs)
+        return inputs
 
     def now(self, measurement: Measurement, reference: Reference) -> SimpleNamespace:
         assert not self.run_stages(measurement, reference)
-        given, memory = self.known.given, self.memory
+        inputs, memory = self.estimate.inputs, self.memory
         return SimpleNamespace(
-            motion=self.known.motion.rows,
-            moving=given.moving,
-            force=given.force,
-            believed=given.believed,
-            unseen=self.known.unseen,
+            motion=self.estimate.motion.rows,
+            moving=inputs.moving,
+            force=inputs.force,
+            believed=inputs.believed,
+            unseen=self.estimate.unseen,
             joints=memory.joints.rows,
             spools=memory.chambers.spool,
             pressures=memory.chambers.pressure,
@@ -250,11 +250,11 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
     assert np.abs(now.unseen - now.believed).min() > 1
     for begun in range(400, 428, NODES):
         observed = now.unseen - now.believed
-        given = part.foreseen(turning(begun, push)[1])
+        inputs = part.predicted(turning(begun, push)[1])
         for k in range(NODES):
             now, other = both(begun + 1 + k)
-            np.testing.assert_allclose(given.motion[4 * k : 4 * k + 4], now.motion[:4], rtol=1e-10, atol=1e-12)
-            np.testing.assert_allclose(given.unseen[2 * k : 2 * k + 2] - observed, now.believed, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(inputs.motion[4 * k : 4 * k + 4], now.motion[:4], rtol=1e-10, atol=1e-12)
+            np.testing.assert_allclose(inputs.unseen[2 * k : 2 * k + 2] - observed, now.believed, rtol=1e-9, atol=1e-9)
             assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
             later.append(now.believed - believed)
     assert np.all(np.abs(later).max(axis=0) >= 10 * fraction)

@@ -77,7 +77,7 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     assert resolved(f"limited:{name}[lead_time=2]") == (resolved(name)[0], {**resolved(name)[1], "lead_time": 2.0})
     short, long = (make_controller(one, RIG) for one in (name, whole))
     assert type(short) is type(long)
-    for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
+    for one, other in zip(short.controller_stages(True), long.controller_stages(True), strict=True):
         assert one.function is other.function
         np.testing.assert_array_equal(one.constants, other.constants)
 

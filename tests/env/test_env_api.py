@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from birthsim_env import ForceProfile, Hold, Parameters
+from birthsim_env import FixedTarget, ForceProfile, Parameters
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.scenarios import environment_id
@@ -53,7 +53,7 @@ EPISODES += [(CIRCLE, *one) for one in ((0.2, 0.01, 20), (0.2, 0.001, 200), (0.2
 @pytest.mark.parametrize(("name", "duration", "period", "steps"), EPISODES)
 def test_an_episode_is_truncated_exactly_at_its_end(name, duration, period, steps):
     # Holding still needs a hand on the valves: keep the episode alive without any force of the user.
-    env = make(name, duration=duration, policy_period=period, user_force=ForceProfile(), reference=Hold((0.5, 0.0)))
+    env = make(name, duration=duration, policy_period=period, user_force=ForceProfile(), reference=FixedTarget((0.5, 0.0)))
     env.reset(seed=0)
     ends = [env.step(np.zeros(4))[2:4] for _ in range(steps)]
     assert ends == [(False, False)] * (steps - 1) + [(False, True)]

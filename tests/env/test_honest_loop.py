@@ -6,7 +6,7 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
-from birthsim_env import ForceProfile, Hold, Parameters, StiffnessSchedule
+from birthsim_env import FixedTarget, ForceProfile, Parameters, StiffnessSchedule
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
@@ -66,7 +66,7 @@ def test_a_rig_held_at_its_port_has_the_control_board_of_its_sensors():
     port = RigPort([rig] * 2, reference, law, "honest", seed=5)
     pneumatic1, pneumatic2 = ((value,) for value in reference.pneumatic_stiffness[:, 0])
     parts = {
-        "reference": Hold(),
+        "reference": FixedTarget(),
         "user_force": ForceProfile(),
         "stiffness": StiffnessSchedule(pneumatic1=pneumatic1, pneumatic2=pneumatic2),
     }

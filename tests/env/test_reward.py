@@ -90,18 +90,18 @@ def assess(lanes=1, policy_period=0.01, **changes):
         if name in World.groups:
             world.rows[World.groups[name].place] = given[name]
     limits = reward.Limits(reward.Limits.numbers(period=policy_period, jumped_below=0.5 * policy_period, impact_speed=0.1))
-    terms, failed = reward.Terms(np.empty((reward.Terms.size, lanes))), np.empty(lanes)
-    owed = reward.Owed(given["owed"])
-    reward.assess(world, reference, owed, given["action"], given["last_action"], limits, terms, failed, lanes)
-    return dict(zip(reward.REWARD_TERMS, terms.rows, strict=False)), failed
+    terms, terminated = reward.Terms(np.empty((reward.Terms.size, lanes))), np.empty(lanes)
+    lag = reward.TargetLag(given["owed"])
+    reward.assess(world, reference, lag, given["action"], given["last_action"], limits, terms, terminated, lanes)
+    return dict(zip(reward.REWARD_TERMS, terms.rows, strict=False)), terminated
 
 
 def test_the_terms_are_named_in_order():
     assert reward.REWARD_TERMS == TERMS
-    terms, failed = assess(lanes=3)
+    terms, terminated = assess(lanes=3)
     np.testing.assert_array_equal(terms.pop("reward_survive"), 1.0)
     assert not any(term.any() for term in terms.values())
-    assert not failed.any()
+    assert not terminated.any()
 
 
 @pytest.mark.parametrize("period", [0.001, 0.01, 0.05])

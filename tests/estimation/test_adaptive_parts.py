@@ -8,7 +8,7 @@ from baselines.estimation.friction_level import Friction
 from baselines.estimation.hand import force_bias, force_observer
 from baselines.estimation.hand.force_observer import Hand
 from baselines.estimation.inertia import Inertia
-from baselines.estimation.rows import Belief, Given, Pistons
+from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints
@@ -22,7 +22,7 @@ PERIOD = 1e-3
 def rubbing(coulomb):
     """What is believed of a rig whose pistons have this Coulomb friction, N."""
     rig = Parameters().replace({f"cylinder{k}.coulomb_friction": coulomb for k in (1, 2)})
-    return Belief(observers.belief(rig))
+    return AssumedParameters(observers.assumed_parameters(rig))
 
 
 @pytest.mark.parametrize("spread", [2e-5, 1e-4, 5e-4])
@@ -45,13 +45,13 @@ def test_tracker_noise_is_found_at_irregular_times_and_any_speed(spread):
 
 def test_level_and_offset_of_friction_are_told_apart_by_sliding_both_ways():
     coulomb, level, offset = 12.0, 1.6, 4.0
-    friction, fresh, belief = Friction(np.zeros((Friction.size, 1))), np.ones(1), rubbing(coulomb)
+    friction, fresh, assumed = Friction(np.zeros((Friction.size, 1))), np.ones(1), rubbing(coulomb)
     for k in range(12000):
         speed = 0.05 if (k // 500) % 2 == 0 else -0.05
         drag = np.full((2, 1), coulomb * np.sign(speed))
         left = -(level * drag + offset)
         joints = np.array([[0.0], [0.0], [speed], [speed]])
-        friction_level.learn(friction, drag, Joints(joints), left, 4.0, belief, fresh)
+        friction_level.learn(friction, drag, Joints(joints), left, 4.0, assumed, fresh)
         fresh[:] = 0.0
     # While u is between +-SLIDING and +-1 it is not yet what the force is: the level ends within the mean of 1/u.
     np.testing.assert_allclose(friction.level, level, rtol=0.02)
@@ -60,9 +60,9 @@ def test_level_and_offset_of_friction_are_told_apart_by_sliding_both_ways():
 
 def test_nothing_is_learned_of_a_piston_that_is_stuck():
     friction, fresh, drag = Friction(np.zeros((Friction.size, 1))), np.ones(1), np.full((2, 1), 12.0)
-    belief, still = rubbing(12.0), Joints(np.zeros((Joints.size, 1)))
+    assumed, still = rubbing(12.0), Joints(np.zeros((Joints.size, 1)))
     for _ in range(1000):
-        friction_level.learn(friction, drag, still, np.zeros((2, 1)), 4.0, belief, fresh)
+        friction_level.learn(friction, drag, still, np.zeros((2, 1)), 4.0, assumed, fresh)
         fresh[:] = 0.0
     np.testing.assert_array_equal(friction.level, 1.0)
 
@@ -92,17 +92,17 @@ def swung(mass, held=0.0):
 
     A constant force, like a weight or a bias, is unknown as well. The observer's d is Newton's law, low-passed three times.
     """
-    belief, p = Belief(observers.belief(Parameters(), 110.0)), Rig(parameter_column(Parameters()))
+    assumed, p = AssumedParameters(observers.assumed_parameters(Parameters(), 110.0)), Rig(parameter_column(Parameters()))
     kappa, sine, cosine = geometry.pose(0.02, -0.01, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)[5:]
     found, fresh = Inertia(Inertia.lane(mass=p.mass)[:, None]), np.ones(1)
-    pistons, given = Pistons(np.zeros((Pistons.size, 1))), Given(np.zeros((Given.size, 1)))
+    pistons, inputs = Pistons(np.zeros((Pistons.size, 1))), Inputs(np.zeros((Inputs.size, 1)))
     lag, kept, pressures = np.zeros((3, 2)), np.exp(-110.0 * PERIOD), np.full((4, 1), p.atmosphere)
     for k in range(int(SECONDS / PERIOD)):
         push = PUSH * np.sin(SWING * k * PERIOD)
-        given.force[:, 0] = cosine * push[0] + sine * push[1], sine * push[0] - cosine * push[1]
+        inputs.force[:, 0] = cosine * push[0] + sine * push[1], sine * push[0] - cosine * push[1]
         truth = ((1.0 - held) * push + 20.0) / mass
         pistons.disturbance[:, 0] = lag[2] / [-kappa, 1.0]
-        inertia.learn(found, 0, (kappa, sine, cosine), pistons, pressures, given, belief, fresh)
+        inertia.learn(found, 0, (kappa, sine, cosine), pistons, pressures, inputs, assumed, fresh)
         fresh[:], into = 0.0, truth - push / found.mass[0]
         for stage in lag:
             stage += (1.0 - kept) * (into - stage)

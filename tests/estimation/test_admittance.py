@@ -42,7 +42,7 @@ class Follower:
     def update(self, force: Array, reference: Reference, factor: Array | None = None) -> Array:
         lanes = force.shape[1]
         motion, factor = Motion(np.empty((Motion.size, lanes))), np.zeros(lanes) if factor is None else factor
-        assert admittance.give_way(self.offset, reference, force, self._about, factor, motion) == 0
+        assert admittance.update_motion(self.offset, reference, force, self._about, factor, motion) == 0
         return motion.rows
 
     def forecast(self, reference: Reference, force: Array, ticks: Array) -> Array:

@@ -18,7 +18,7 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
 
     ``motion(t)`` -> (x, v) on both axes; ``acceleration(t, k)`` -> (2, lanes) is felt; ``wrong``: x, v and bias are put off.
     """
-    stage, rng = inertial.law_stage(Parameters()), np.random.default_rng(7)
+    stage, rng = inertial.controller_stage(Parameters()), np.random.default_rng(7)
     memory, gains = inertial.Memory(np.repeat(stage.fresh[:, None], lanes, axis=1)), inertial.Gains(stage.constants)
     point, signals = inertial.Moving(np.empty((inertial.Moving.size, lanes))), Signals(np.zeros((Signals.size, lanes)))
     taken, truth, found = [(begin, *(np.full((2, lanes), one) for one in motion(begin)))], [], []

@@ -5,11 +5,11 @@ import pytest
 
 from baselines.estimation import observers
 from baselines.estimation.hand import held_force, inertial_force
-from baselines.estimation.hand.bristle_observer import Felt
+from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
-from baselines.estimation.hand.held_force import Hold
+from baselines.estimation.hand.held_force import RestDetector
 from baselines.estimation.inertial import Moving
-from baselines.estimation.rows import Belief
+from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
@@ -34,22 +34,22 @@ class Observed:
     positions arrive. Its clock begins at ``time``, s."""
 
     def __init__(self, rig, time=0.0):
-        self.hand, self.felt, self.hold = (kind(np.zeros((kind.size, 1))) for kind in (Hand, Felt, Hold))
+        self.hand, self.contact, self.hold = (kind(np.zeros((kind.size, 1))) for kind in (Hand, ContactForce, RestDetector))
         self.seen, self.moving, self.joints = (kind(np.zeros((kind.size, 1))) for kind in (Seen, Moving, Joints))
-        self.belief, self.fresh, self.seen.time[:] = Belief(observers.belief(rig)), np.ones(1), time
+        self.assumed, self.fresh, self.seen.time[:] = AssumedParameters(observers.assumed_parameters(rig)), np.ones(1), time
 
     def see(self, y, speed, acceleration, pressures):
         self.joints.position[:, 0], self.joints.speed[:, 0], self.moving.acceleration[:, 0] = y, speed, acceleration
         inertial_force.observe(
             self.hand,
-            self.felt,
+            self.contact,
             self.hold,
             self.seen,
             self.moving,
             self.joints,
             pressures[:, None],
             np.full(1, 1e-4),
-            self.belief,
+            self.assumed,
             self.fresh,
         )
         self.fresh[:] = 0.0
@@ -79,7 +79,7 @@ def test_while_pistons_slide_it_is_what_newtons_law_asks_for(v1, v2):
 
 def held(course, ticks):
     """The force held (ticks, 2) of a lane where ``course(k)`` (2,), N, is found."""
-    memory, force, fresh, found = Hold(np.zeros((Hold.size, 1))), np.zeros((2, 1)), np.ones(1), []
+    memory, force, fresh, found = RestDetector(np.zeros((RestDetector.size, 1))), np.zeros((2, 1)), np.ones(1), []
     for k in range(ticks):
         held_force.hold(memory, np.array(course(k))[:, None], PERIOD, fresh, force)
         fresh[:] = 0.0

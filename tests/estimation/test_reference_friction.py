@@ -25,7 +25,7 @@ class Friction:
 
     def update(self, motion: Array) -> Array:
         drag = np.empty_like(self.bristles)
-        reference_friction.rub(Motion(motion), self._p, self._period, self.bristles, drag)
+        reference_friction.update_bristle(Motion(motion), self._p, self._period, self.bristles, drag)
         return drag
 
     def forecast(self, ahead: Array, ticks: Array) -> Array:

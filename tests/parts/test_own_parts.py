@@ -83,7 +83,7 @@ import birthsim_env
 def along(t):
     return 0.5 + 0.01 * t, 0.0
 
-class Still(birthsim_env.Hold):
+class Still(birthsim_env.FixedTarget):
     pass
 """
 

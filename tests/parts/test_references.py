@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env import Circle, Hold, Parameters, Path, Trajectory
+from birthsim_env import Circle, FixedTarget, Parameters, Path, Trajectory
 from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
@@ -180,7 +180,7 @@ def test_an_odd_rig_that_is_taken_reaches_every_later_episode(scenario):
 
 
 def test_a_trajectory_that_is_checked_stays_as_it_was():
-    trajectory = Hold(((0.4, 0.6), (-0.1, 0.06)))
+    trajectory = FixedTarget(((0.4, 0.6), (-0.1, 0.06)))
     trajectory.prepare(3)
     trajectory.begin(1, np.random.default_rng(0))
     before = trajectory.sample(np.zeros(3))

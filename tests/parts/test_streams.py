@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from birthsim_env import Circle, Hold, StiffnessSchedule
+from birthsim_env import Circle, FixedTarget, StiffnessSchedule
 from birthsim_env.parts import courses
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
@@ -219,7 +219,7 @@ def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
 
 @pytest.mark.parametrize("part", ["reference", "stiffness"])
 def test_a_users_own_sample_is_the_one_that_is_checked(part):
-    class Away(Hold):
+    class Away(FixedTarget):
         def sample(self, time):
             return super().sample(time) + np.where(time > 2.0, 1.0, 0.0)
 
@@ -236,7 +236,7 @@ def test_a_users_own_sample_is_the_one_that_is_checked(part):
 
 def test_a_reference_on_the_very_border_of_the_workspace_is_allowed():
     """The quick look is undecided there; the exact one decides."""
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=Hold((0.7, 0.0)), user_force="sine")
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=FixedTarget((0.7, 0.0)), user_force="sine")
     env.reset(seed=0)
     with pytest.raises(ValueError, match="unreachable"):
-        gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=Hold((0.7 + 1e-9, 0.0))).reset(seed=0)
+        gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=FixedTarget((0.7 + 1e-9, 0.0))).reset(seed=0)

@@ -7,7 +7,7 @@ import numpy as np
 
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
-from agents.residual.law import observation_names
+from agents.residual.corrected import observation_names
 from agents.residual.settings import ResidualSettings
 
 ENVIRONMENT = "BirthSIM/ProbeResidual-v2"

@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.residual.law import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, ResidualLaw, stiffen
+from agents.residual.corrected import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, CorrectedController, stiffen
 from agents.residual.settings import ResidualSettings
 from baselines.registry import make_controller
 from birthsim_env import Parameters
@@ -59,7 +59,9 @@ def test_a_swing_that_the_law_keeps_up_dies_sooner_with_less_stiffness_but_for_f
 
     def answers(push: float) -> list[Array]:
         """Of the law alone, and with a residual that says nothing, of fixed and of variable impedance."""
-        residuals = [ResidualLaw(Parameters(), ResidualSettings(name, impedance)) for impedance in ("fixed", "variable_kp")]
+        residuals = [
+            CorrectedController(Parameters(), ResidualSettings(name, impedance)) for impedance in ("fixed", "variable_kp")
+        ]
         for residual in residuals:
             residual.reset(np.ones(1, dtype=np.bool_))
         return [shocked(law.command, push) for law in (make_controller(name, Parameters()), *residuals)]
@@ -82,7 +84,7 @@ def pushed(damping: float, sensed: bool, push: float, seconds: float = 2.5) -> A
     rig, lanes = closed_loop.FRICTIONLESS, 2 * POWERS.shape[1]
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), 2000.0)
     plant = closed_loop.resting_at(wanted, rig)
-    law = ResidualLaw(rig, ResidualSettings("backstepping-weight", "variable"))
+    law = CorrectedController(rig, ResidualSettings("backstepping-weight", "variable"))
     law.reset(np.ones(lanes, dtype=np.bool_))
     law.accept(np.concatenate([np.zeros((2, lanes)), np.tile(POWERS, 2), np.full((1, lanes), damping)]))
     force = push * np.repeat(np.eye(2), POWERS.shape[1], axis=1)
@@ -113,7 +115,7 @@ def test_a_force_that_no_sensor_tells_of_meets_the_stiffness_that_the_policy_cho
 def test_the_stiffness_yields_with_the_authority() -> None:
     """Where one cylinder oscillates, on both axes: each axis moves both cylinders."""
     fractions = np.array([[1.0, 0.5, 1.0], [1.0, 1.0, 0.2]])
-    law = ResidualLaw(closed_loop.FRICTIONLESS, ResidualSettings("backstepping", "variable_kp", time_constant=1e-4))
+    law = CorrectedController(closed_loop.FRICTIONLESS, ResidualSettings("backstepping", "variable_kp", time_constant=1e-4))
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 1000.0)
     plant = closed_loop.resting_at(wanted, closed_loop.FRICTIONLESS)
     law.reset(np.ones(3, dtype=np.bool_))
@@ -129,7 +131,7 @@ def test_the_last_entry_raises_the_damping_up_to_twice_and_lowers_it_never() -> 
     actions, factors = np.zeros((5, 3)), []
     actions[4] = [1.0, -1.0, 0.25]
     laws = [
-        ResidualLaw(closed_loop.FRICTIONLESS, ResidualSettings("backstepping", impedance, time_constant=0.05))
+        CorrectedController(closed_loop.FRICTIONLESS, ResidualSettings("backstepping", impedance, time_constant=0.05))
         for impedance in ("variable", "fixed")
     ]
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 1000.0)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents.residual import authority
-from agents.residual.law import ResidualActuation, ResidualLaw
+from agents.residual.corrected import ResidualActuation, CorrectedController
 from agents.residual.settings import IMPEDANCES, LAWS, needs_force
 from baselines.registry import make_controller
 from birthsim_env import Parameters
@@ -126,7 +126,7 @@ def test_a_held_action_becomes_a_feedforward_force_and_its_rate_through_the_low_
 def told(monkeypatch):
     """Forces (2, N), N, and rates (2, N), N/s, that the law inside was told about, (4, N) a control period: the loop, else
     compiled, stops for it."""
-    beliefs, command = [], ResidualLaw.command
+    beliefs, command = [], CorrectedController.command
 
     def spied(self, measurement, reference):
         openings = command(self, measurement, reference)
@@ -135,7 +135,7 @@ def told(monkeypatch):
         return openings
 
     monkeypatch.setattr(ResidualActuation, "stages", None)
-    monkeypatch.setattr(ResidualLaw, "command", spied)
+    monkeypatch.setattr(CorrectedController, "command", spied)
     return beliefs
 
 

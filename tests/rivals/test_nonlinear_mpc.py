@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessTest, run_stiffness_test
 from baselines.rivals import predictive
-from baselines.rivals.horizon import FLOWS, HALF, NODES, SIZE, Situation, programme
+from baselines.rivals.horizon import FLOWS, HALF, NODES, SIZE, HorizonInputs, programme
 from baselines.rivals.predictive import Constants, NonlinearMPC, improve
 from baselines.rivals.quadratic import minimise, slope
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_columns
@@ -26,21 +26,21 @@ FLOW = 1e-3
 
 
 def constants(sensors: str = "ideal", rig: Parameters = RIG, **gains: float) -> Constants:
-    return Constants(NonlinearMPC(rig, **gains).law_stages(sensors == "lab")[0].constants)
+    return Constants(NonlinearMPC(rig, **gains).controller_stages(sensors == "lab")[0].constants)
 
 
-def situation(lanes: int, seed: int, error: float) -> Situation:
+def situation(lanes: int, seed: int, error: float) -> HorizonInputs:
     """Rigs near balance and targets ``error`` m beside them, with noise on all else."""
-    rng, given = np.random.default_rng(seed), Situation(np.empty((Situation.size, lanes)))
+    rng, inputs = np.random.default_rng(seed), HorizonInputs(np.empty((HorizonInputs.size, lanes)))
     now = rigid_body.near_balance(RIG, lanes, seed, 0.02, 10.0)
-    given.joints.position[:], given.joints.speed[:], given.pressure[:] = now.piston, now.speed, now.pressures
+    inputs.joints.position[:], inputs.joints.speed[:], inputs.pressure[:] = now.piston, now.speed, now.pressures
     target = rigid_body.pose_of(now.piston, RIG).end_effector + error * rng.normal(size=(2, lanes))
     for k in range(NODES):
-        given.motion[4 * k : 4 * k + 4] = np.concatenate([target, rng.normal(0, 0.01, (2, lanes))])
-    given.flow[:], given.stiffness[:] = FLOW * rng.normal(0, 0.1, (FLOWS, lanes)), np.tile(now.stiffness, (NODES, 1))
-    given.stiffness[:] += rng.normal(0, 30, (2 * NODES, lanes))
-    given.force[:], given.unseen[:] = rng.normal(0, 3, (2, lanes)), rng.normal(0, 3, (2 * NODES, lanes))
-    return given
+        inputs.motion[4 * k : 4 * k + 4] = np.concatenate([target, rng.normal(0, 0.01, (2, lanes))])
+    inputs.flow[:], inputs.stiffness[:] = FLOW * rng.normal(0, 0.1, (FLOWS, lanes)), np.tile(now.stiffness, (NODES, 1))
+    inputs.stiffness[:] += rng.normal(0, 30, (2 * NODES, lanes))
+    inputs.force[:], inputs.unseen[:] = rng.normal(0, 3, (2, lanes)), rng.normal(0, 3, (2 * NODES, lanes))
+    return inputs
 
 
 def bounds(scale: float, lanes: int) -> tuple[Array, Array]:
@@ -49,10 +49,10 @@ def bounds(scale: float, lanes: int) -> tuple[Array, Array]:
     return (scale * FLOW * np.repeat(side[:, None], lanes, axis=1) for side in (low, high))  # type: ignore[return-value]
 
 
-def linearised(plan: Array, given: Situation) -> tuple[Array, Array]:
+def linearised(plan: Array, inputs: HorizonInputs) -> tuple[Array, Array]:
     lanes = plan.shape[1]
     h, g = np.empty((HALF, lanes)), np.empty((SIZE, lanes))
-    programme(plan, given, parameter_columns(RIG, lanes), constants().horizon, h, g, lanes)
+    programme(plan, inputs, parameter_columns(RIG, lanes), constants().horizon, h, g, lanes)
     return h, g
 
 
@@ -81,13 +81,13 @@ def test_a_better_plan_is_the_bounded_least_squares_solution(limits: str) -> Non
 
 def test_repeated_it_finds_a_minimum_of_the_nonlinear_sum_of_squares() -> None:
     """Nothing that a flow may do makes the sum smaller, within bounds of which some are active."""
-    lanes, given = 4, situation(4, 3, 3e-4)
+    lanes, inputs = 4, situation(4, 3, 3e-4)
     low, high = bounds(1.0, lanes)
     plan, about = np.zeros((SIZE, lanes)), constants()
-    _, begun = linearised(plan, given)
+    _, begun = linearised(plan, inputs)
     for _ in range(20):
-        improve(plan, given, low.copy(), high.copy(), about, lanes)
-    _, g = linearised(plan, given)
+        improve(plan, inputs, low.copy(), high.copy(), about, lanes)
+    _, g = linearised(plan, inputs)
     at_low, at_high = plan <= np.tile(low, (NODES, 1)), plan >= np.tile(high, (NODES, 1))
     free = ~(at_low | at_high)
     assert 0 < free.sum() < free.size
@@ -101,9 +101,9 @@ def test_without_numbers_there_is_no_flow() -> None:
     about, good, wide = constants(), situation(1, 1, 3e-4), np.ones((FLOWS, 1))
     expected = np.zeros((SIZE, 1))
     improve(expected, good, -wide, wide.copy(), about, 1)
-    for row in range(Situation.size):
+    for row in range(HorizonInputs.size):
         for nothing in (np.nan, np.inf):
-            both, plan = Situation(np.repeat(good.rows, 2, axis=1)), np.zeros((SIZE, 2))
+            both, plan = HorizonInputs(np.repeat(good.rows, 2, axis=1)), np.zeros((SIZE, 2))
             both.rows[row, 1] = nothing
             improve(plan, both, -np.ones((FLOWS, 2)), np.ones((FLOWS, 2)), about, 2)
             assert np.array_equal(plan[:, :1], expected)
@@ -113,12 +113,12 @@ def test_without_numbers_there_is_no_flow() -> None:
 def test_a_prediction_that_runs_away_gives_a_plan_within_bounds_too() -> None:
     """A piston pressed against its end stop, of which the prediction has none."""
     pressures, about = np.linspace(2e5, 7e5, 30), constants()
-    given, plan = Situation(np.zeros((Situation.size, 30))), np.zeros((SIZE, 30))
-    given.joints.position[1] = RIG.cylinder2.stroke / 2
-    given.pressure[:] = [np.full(30, 4e5), np.full(30, 4e5), pressures, np.full(30, 1.1e5)]
-    given.motion[::4], given.stiffness[::2], given.stiffness[1::2] = 0.5, 4400.0, 2200.0
+    inputs, plan = HorizonInputs(np.zeros((HorizonInputs.size, 30))), np.zeros((SIZE, 30))
+    inputs.joints.position[1] = RIG.cylinder2.stroke / 2
+    inputs.pressure[:] = [np.full(30, 4e5), np.full(30, 4e5), pressures, np.full(30, 1.1e5)]
+    inputs.motion[::4], inputs.stiffness[::2], inputs.stiffness[1::2] = 0.5, 4400.0, 2200.0
     low, high = -FLOW * np.ones((FLOWS, 30)), 3 * FLOW * np.ones((FLOWS, 30))
-    improve(plan, given, low.copy(), high.copy(), about, 30)
+    improve(plan, inputs, low.copy(), high.copy(), about, 30)
     assert np.all((plan >= np.tile(low, (NODES, 1))) & (plan <= np.tile(high, (NODES, 1))))
 
 
@@ -140,10 +140,10 @@ def test_tolerances_are_the_gains_of_their_names() -> None:
     """Of the sensors they were tuned for, where none are given."""
     own = {"speed_tolerance": 0.011, "stiffness_tolerance": 123.0, "flow_tolerance": 4e-4}
     for sensors, tuned in NonlinearMPC.TUNED.items():
-        given, found = constants(sensors, **own).horizon, constants(sensors).horizon
-        assert given.position == found.position == NonlinearMPC.POSITION_TOLERANCE
+        inputs, found = constants(sensors, **own).horizon, constants(sensors).horizon
+        assert inputs.position == found.position == NonlinearMPC.POSITION_TOLERANCE
         for name in ("speed", "stiffness", "flow"):
-            assert getattr(given, name) == own[f"{name}_tolerance"]
+            assert getattr(inputs, name) == own[f"{name}_tolerance"]
             assert getattr(found, name) == tuned[f"{name}_tolerance"]
 
 
@@ -157,13 +157,13 @@ def test_what_is_known_makes_the_plan_and_its_first_flow_the_openings(sensors: s
         wanted.rows[12:14] = [[300.0, -200.0], [-150.0, 400.0]]
         openings = controller.command(measured, wanted)
         now = knowing.now(measured, wanted)
-        given = knowing.foreseen(wanted)
+        inputs = knowing.predicted(wanted)
         asked = wanted.rows[10:12] + np.cumsum(about.horizon.step)[:, None, None] * wanted.rows[12:14]
-        np.testing.assert_allclose(given.stiffness.reshape(-1, 2, lanes), asked, rtol=1e-12)
+        np.testing.assert_allclose(inputs.stiffness.reshape(-1, 2, lanes), asked, rtol=1e-12)
         spools = (now.spools, np.full((4, lanes), -1.0), np.ones((4, lanes)))
         through = np.vectorize(lambda s, p: derived_law.net_flow(s, p, RIG))
-        given.flow[:], low, high = (through(spool, now.pressures) for spool in spools)
-        improve(plan, given, low, high, about, lanes)
+        inputs.flow[:], low, high = (through(spool, now.pressures) for spool in spools)
+        improve(plan, inputs, low, high, about, lanes)
         expected = np.vectorize(lambda q, p: derived_law.opening_for(q, p, RIG))(plan[:FLOWS], now.pressures)
         np.testing.assert_allclose(openings, expected, rtol=0, atol=1e-9)
         plan = np.stack([later(own, about.horizon.step) for own in plan.T], axis=1)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from baselines.rivals import horizon
-from baselines.rivals.horizon import FLOWS, FORCES, HALF, NODES, OUTPUTS, POINTS, SIZE, STATE, Horizon, Situation
+from baselines.rivals.horizon import FLOWS, FORCES, HALF, NODES, OUTPUTS, POINTS, SIZE, STATE, Horizon, HorizonInputs
 from baselines.rivals.symbolic import ALGEBRAS, symbolic_model
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column, parameter_columns
 from birthsim_env.physics.rig.parameters import Parameters
@@ -158,9 +158,9 @@ def test_end_effector_and_pneumatic_stiffness(rig: Parameters) -> None:
         np.testing.assert_allclose(found[4:, lane], expected[4:], rtol=1e-6)
 
 
-def drawn(rig: Parameters, lanes: int, seed: int) -> Situation:
+def drawn(rig: Parameters, lanes: int, seed: int) -> HorizonInputs:
     """Random situations; motion and stiffnesses are some tolerances away."""
-    rng, given = np.random.default_rng(seed), Situation(np.empty((Situation.size, lanes)))
+    rng, given = np.random.default_rng(seed), HorizonInputs(np.empty((HorizonInputs.size, lanes)))
     state = states(rig, lanes, seed) * UNITS[:, None]
     given.joints.rows[:], given.pressure[:], given.flow[:] = state[:4], state[4:], FLOW * rng.normal(0, 1, (FLOWS, lanes))
     given.force[:], given.unseen[:] = rng.normal(0, 20, (2, lanes)), rng.normal(0, 20, (2 * NODES, lanes))
@@ -169,7 +169,7 @@ def drawn(rig: Parameters, lanes: int, seed: int) -> Situation:
     return given
 
 
-def written_out(rig: Parameters, given: Situation, plan: Array, weight: Array) -> Array:
+def written_out(rig: Parameters, given: HorizonInputs, plan: Array, weight: Array) -> Array:
     """The residuals (10 NODES, N) as the module's documentation states them; ``plan`` (SIZE, N) in FLOW."""
     now = np.concatenate([given.joints.rows, given.pressure / PRESSURE, given.flow / FLOW])
     before, found = now[8:], []
@@ -185,7 +185,7 @@ def written_out(rig: Parameters, given: Situation, plan: Array, weight: Array) -
     return np.concatenate(found)
 
 
-def programmes(rig: Parameters, given: Situation, plan: Array, weight: Array) -> tuple[Array, Array]:
+def programmes(rig: Parameters, given: HorizonInputs, plan: Array, weight: Array) -> tuple[Array, Array]:
     """Squared slopes (HALF, N) and slopes (SIZE, N), by flows in FLOW; ``plan`` in FLOW."""
     lanes = plan.shape[1]
     h, g = np.empty((HALF, lanes)), np.empty((SIZE, lanes))

@@ -8,14 +8,14 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from baselines.estimation.stages import MOTION
 from baselines.rivals import lqr, pid
-from baselines.rivals.feedforward import SIGN_WIDTH, Tracked, feedforward
+from baselines.rivals.feedforward import SIGN_WIDTH, Tracking, feedforward
 from baselines.rivals.lqr import LinearQuadratic
 from baselines.rivals.pid import PositionPID
 from baselines.rivals.sliding_mode import SlidingMode
 from baselines.rivals.tracking import TrackingController
 from baselines.valve_inverse import CylinderAir
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import HANDED, Seen
+from birthsim_env.loop.rows import INTERMEDIATE, Seen
 from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics import geometry
@@ -38,8 +38,8 @@ def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, forc
     placed = [
         (motion, MOTION),
         (force.copy(), Seen.user_force.first),
-        (wanted, HANDED + Tracked.wanted.first),
-        (needed, HANDED + Tracked.needed.first),
+        (wanted, INTERMEDIATE + Tracking.wanted.first),
+        (needed, INTERMEDIATE + Tracking.needed.first),
     ]
     Loop(lanes, [], placed, [Stage(stage.function, stage.constants, sees_world=False)]).run()
     np.testing.assert_allclose(wanted[:6], joints[:6], atol=1e-10)

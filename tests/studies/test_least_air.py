@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.bench.pneumatic_range import pneumatic_range
-from birthsim_env import Circle, Hold, Parameters, Path, StiffnessSchedule
+from birthsim_env import Circle, FixedTarget, Parameters, Path, StiffnessSchedule
 from lab.studies.least_air import schedule as module
 from lab.studies.least_air.schedule import GRID, least_air, supplied
 from tests.console import ROOT, call, strict
@@ -89,14 +89,14 @@ WRONG = [
     ({"pushes": [(400.0, 0.0)]}, r"pushes = .* are more than cylinder 2 bears from 0 s on with reserve = 30000 Pa"),
     *(({name: value}, rf"{name} = {value}") for name, value in (("phase", 0.2), ("duration", 0.0), ("reserve", -1.0))),
     ({"stiffness": StiffnessSchedule((0.0,), ((1000.0, 2000.0),))}, r"closed_loop = .*; allowed: numbers, not ranges"),
-    ({"reference": Hold((0.9, 0.0))}, r"unreachable"),
+    ({"reference": FixedTarget((0.9, 0.0))}, r"unreachable"),
 ]
 
 
 @pytest.mark.parametrize(("wrong", "message"), WRONG)
 def test_what_cannot_be_is_refused(wrong, message):
     with pytest.raises(ValueError, match=message):
-        least_air(**{"reference": Hold(), "stiffness": OWN, "duration": 4.0, "rig": RIG, "pushes": PUSHES, **wrong})
+        least_air(**{"reference": FixedTarget(), "stiffness": OWN, "duration": 4.0, "rig": RIG, "pushes": PUSHES, **wrong})
 
 
 @pytest.mark.slow

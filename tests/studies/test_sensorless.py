@@ -6,8 +6,8 @@ import pytest
 from baselines.bench.resting import RestingRigs
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from lab.studies.sensorless.privileged import Privileged
 from lab.studies.sensorless.study import RIGS
-from lab.studies.sensorless.told import Told
 from lab.studies.shaken import at_rest
 from tests.console import ROOT
 
@@ -26,7 +26,7 @@ def test_each_lane_is_that_of_the_law_that_is_told_its_rig(controller, file):
         loop.close([])
         return loop.path(300)
 
-    found = path(Told(laws))
+    found = path(Privileged(laws))
     alone = [path(law) for law in laws]
     assert (alone[0][:, :, 1] != alone[1][:, :, 1]).any()
     for lane in range(2):
@@ -35,7 +35,7 @@ def test_each_lane_is_that_of_the_law_that_is_told_its_rig(controller, file):
 
 def test_it_declares_what_each_law_declares():
     laws = [make_controller("admittance", Parameters().replace({"mechanics.mass": mass})) for mass in (2.0, 4.5)]
-    told, reference = Told(laws), at_rest(2)
+    told, reference = Privileged(laws), at_rest(2)
     np.testing.assert_array_equal(told.declared_impedance(reference).mass[0, 0], [2.0, 4.5])
     np.testing.assert_array_equal(
         told.declared_impedance(reference).damping[..., 1], laws[1].declared_impedance(reference).damping[..., 1]
@@ -44,7 +44,7 @@ def test_it_declares_what_each_law_declares():
 
 def test_a_law_that_cannot_serve_its_lane_is_the_one_that_says_so():
     light = {"mechanics.mass": 2.0, "valves.time_constant": 0.008}
-    told = Told([make_controller("backstepping", rig) for rig in (Parameters(), Parameters().replace(light))])
+    told = Privileged([make_controller("backstepping", rig) for rig in (Parameters(), Parameters().replace(light))])
     loop = RestingRigs([Parameters()] * 2, at_rest(2, stiffness=4000.0), told)
     loop.close([])
     with pytest.raises(

@@ -14,7 +14,7 @@ from lab.studies.bandwidth import study as bandwidth
 from lab.studies.comparison import study as comparison
 from lab.studies.comparison.grid import Conditions, as_described, run_cell, settings_of
 from lab.studies.comparison.headline import CONTROLLERS, is_shown, learns_mass
-from lab.studies.comparison.told import TOLD, evaluate_told, told_law
+from lab.studies.comparison.privileged import TOLD, evaluate_privileged, privileged_controller
 from lab.studies.leaderboard import RULES, TABLE, table
 from lab.studies.results import read_result
 from lab.studies.shelf import declared, names, texts
@@ -69,7 +69,7 @@ def test_a_controller_is_told_the_rig_of_its_lane(sensors):
     env = gymnasium.make_vec(CIRCLE, num_envs=3, sensors=sensors, randomize=True, parameters=rig)
     env.reset(seed=[SEED, SEED + 1, SEED + 2])
     drawn = env.unwrapped.simulation.plant.lane_parameters
-    told = told_law("backstepping", rig, range(SEED, SEED + 3))
+    told = privileged_controller("backstepping", rig, range(SEED, SEED + 3))
     np.testing.assert_array_equal(np.stack([parameter_column(law.parameters) for law in told._laws], axis=1), drawn)
     env.close()
 
@@ -86,7 +86,7 @@ def test_the_published_law_is_better_told_its_rig():
 
 def test_a_world_that_is_refused_is_lost_and_the_others_are_measured():
     """World 54 has a light rig with slow valves, and asks for more stiffness than that takes."""
-    found = evaluate_told(CIRCLE, "backstepping", Parameters(), range(SEED + 53, SEED + 56), {"randomize": True})
+    found = evaluate_privileged(CIRCLE, "backstepping", Parameters(), range(SEED + 53, SEED + 56), {"randomize": True})
     assert found.seeds == [SEED + 53, SEED + 54, SEED + 55]
     assert found.lost == [False, True, False]
     assert np.isnan(found.metrics["settled_rms"]).tolist() == found.lost

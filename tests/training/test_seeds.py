@@ -17,7 +17,7 @@ from agents.reports import inspection
 from agents.reports.card import compared
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
 from agents.reports.learning_curves import learning_curves, over_seeds
-from agents.residual.law import observation_names
+from agents.residual.corrected import observation_names
 from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import evaluate_piece

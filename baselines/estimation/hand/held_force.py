@@ -24,7 +24,7 @@ FIRST, AVERAGED, DRIFT = 0.1, 1.0, 0.2
 """s, s and 1/s: the force at rest is a mean that begins with the weight of ``FIRST``, for ``AVERAGED``, and then a low-pass."""
 
 
-class Hold(Rows):
+class RestDetector(Rows):
     """What tells a head that rests."""
 
     quick = rows("quick_x quick_y", "N", "force, low-passed with ``QUICK``")
@@ -34,36 +34,36 @@ class Hold(Rows):
 
 
 @helper
-def hold(memory: Hold, bare: Array, period: float, fresh: Array, force: Array) -> None:
+def hold(detector: RestDetector, bare: Array, period: float, fresh: Array, force: Array) -> None:
     """Writes ``force`` (2, N), N: the ``bare`` one (2, N), or at rest its mean."""
     for i in range(fresh.shape[0]):
-        _hold(memory, force, bare, i, period, fresh[i] > 0.0)
+        _hold(detector, force, bare, i, period, fresh[i] > 0.0)
 
 
 @helper
-def _hold(hold: Hold, force: Array, bare: Array, i: int, period: float, new: bool) -> None:
+def _hold(detector: RestDetector, force: Array, bare: Array, i: int, period: float, new: bool) -> None:
     """``hold`` of lane ``i``."""
     if new:
-        hold.still[i], hold.rested[i] = 0.0, 0.0
+        detector.still[i], detector.rested[i] = 0.0, 0.0
     stirred, quick_off, slow_off = 0.0, 0.0, 0.0
     for axis in range(2):
         now = bare[axis, i]
-        quick = now if new else hold.quick[axis, i] + period * QUICK * (now - hold.quick[axis, i])
-        slow = now if new else hold.slow[axis, i] + period * SLOW * (quick - hold.slow[axis, i])
-        hold.quick[axis, i], hold.slow[axis, i] = quick, slow
+        quick = now if new else detector.quick[axis, i] + period * QUICK * (now - detector.quick[axis, i])
+        slow = now if new else detector.slow[axis, i] + period * SLOW * (quick - detector.slow[axis, i])
+        detector.quick[axis, i], detector.slow[axis, i] = quick, slow
         held = force[axis, i]
         stirred, quick_off, slow_off = (
             stirred + (quick - slow) ** 2,
             quick_off + (quick - held) ** 2,
             slow_off + (slow - held) ** 2,
         )
-    resting = hold.rested[i] > 0.0
+    resting = detector.rested[i] > 0.0
     if resting and (quick_off > QUICK_LIMIT * QUICK_LIMIT or slow_off > SLOW_LIMIT * SLOW_LIMIT):
-        hold.still[i], hold.rested[i] = 0.0, 0.0
+        detector.still[i], detector.rested[i] = 0.0, 0.0
     elif not resting:
-        hold.still[i] = 0.0 if stirred > STIRS * STIRS else hold.still[i] + period
-    rested = hold.rested[i] + period if hold.still[i] > SETTLES else 0.0
-    hold.rested[i] = rested
+        detector.still[i] = 0.0 if stirred > STIRS * STIRS else detector.still[i] + period
+    rested = detector.rested[i] + period if detector.still[i] > SETTLES else 0.0
+    detector.rested[i] = rested
     share = 1.0 if rested == 0.0 else period / (FIRST + rested) if rested < AVERAGED else period * DRIFT
     for axis in range(2):
         force[axis, i] = bare[axis, i] if new else force[axis, i] + share * (bare[axis, i] - force[axis, i])

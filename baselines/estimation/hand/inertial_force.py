@@ -12,12 +12,12 @@ import math
 
 from baselines.estimation.hand import bristle_filter, force_bias, held_force
 from baselines.estimation.hand.bristle_filter import SLIDES
-from baselines.estimation.hand.bristle_observer import Felt
+from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.bristled_pistons import carry, see
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
-from baselines.estimation.hand.held_force import Hold
+from baselines.estimation.hand.held_force import RestDetector
 from baselines.estimation.inertial import Moving
-from baselines.estimation.rows import Belief
+from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.rows import POSITION, Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.loop.stage import scratch
@@ -45,19 +45,21 @@ are not seen, a third of what the filter believes. Found by trial; with 0 bristl
 @helper
 def observe(
     hand: Hand,
-    felt: Felt,
-    hold: Hold,
+    contact: ContactForce,
+    detector: RestDetector,
     seen: Signals,
     moving: Moving,
     joints: Joints,
     pressures: Array,
     noise: Array,
-    about: Belief,
+    assumed: AssumedParameters,
     fresh: Array,
 ) -> None:
-    """Carries ``hand``, ``felt`` and ``hold`` on by one period; ``moving`` is the end effector, ``pressures`` (4, N), Pa, the
-    chambers', ``noise`` (N,), m, that of a position sample."""
-    p, period, b, air = about.rig, about.period, felt.pistons, PerChamber(pressures)
+    """Carries ``hand``, ``contact`` and ``detector`` on by one period.
+
+    ``moving`` is the end effector, ``pressures`` (4, N), Pa, the chambers', ``noise`` (N,), m, that of a position sample.
+    """
+    p, period, b, air = assumed.rig, assumed.period, contact.pistons, PerChamber(pressures)
     sample, bare = Joints(scratch(Joints.size)), scratch(2)[:, : fresh.shape[0]]
     piston_motion(seen.rows[POSITION : POSITION + Point.size], p, sample.rows, fresh.shape[0])
     share = period / (1.0 / QUICKNESS + period)
@@ -66,8 +68,8 @@ def observe(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         _, _, _, _, _, kappa, sine, cosine = pose
-        sampled = seen.position_time[i] - felt.newest[i]
-        felt.newest[i] = seen.position_time[i]
+        sampled = seen.position_time[i] - contact.newest[i]
+        contact.newest[i] = seen.position_time[i]
         load1, load2 = carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, UNSEEN, p, period, fresh[i] > 0.0)
         ax, ay = moving.acceleration[0, i], moving.acceleration[1, i] + p.gravity
         left1 = -kappa * p.mass * (ax * cosine + ay * sine) - load1
@@ -85,4 +87,4 @@ def observe(
         hand.filtered[0, i] = 0.0 if fresh[i] > 0.0 else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
         hand.filtered[1, i] = 0.0 if fresh[i] > 0.0 else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
     force_bias.tare(hand.bias, seen.time, hand.filtered, MOST_BIAS, math.inf, period, bare)
-    held_force.hold(hold, bare, period, fresh, hand.force)
+    held_force.hold(detector, bare, period, fresh, hand.force)

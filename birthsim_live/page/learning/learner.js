@@ -70,10 +70,10 @@ export class Learner {
 
   /** Lanes whose episode is over begin anew; 0 in these, 1 in others. */
   endSome() {
-    const failed = this.lanes.row(this.about.at.failed);
+    const terminated = this.lanes.row(this.about.at.terminated);
     return Float64Array.from(this.left, (_, lane) => {
       this.left[lane] -= 1;
-      const ends = failed[lane] > 0 || this.left[lane] === 0;
+      const ends = terminated[lane] > 0 || this.left[lane] === 0;
       if (ends) this.begin(lane);
       return ends ? 0 : 1;
     });

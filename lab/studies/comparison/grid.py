@@ -29,7 +29,7 @@ from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
 from lab.studies.comparison.paired import paired_ratios, summary_with_interval
-from lab.studies.comparison.told import TOLD, can_be_told, evaluate_told
+from lab.studies.comparison.privileged import TOLD, can_be_privileged, evaluate_privileged
 
 ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 COMPARED = ("ideal", "lab")
@@ -134,7 +134,7 @@ def settings_of(name: str, rig: Parameters) -> dict[str, dict[str, Any]]:
     if not name.startswith(LEARNED):
         plain, told = name.removeprefix(TOLD), name.startswith(TOLD)
         own = controller_settings(plain, rig)
-        if told and not can_be_told(plain, rig):
+        if told and not can_be_privileged(plain, rig):
             raise ValueError(
                 f"controller = {shown(name)}; allowed: {TOLD} before a compiled controller without policy and limits"
             )
@@ -186,7 +186,7 @@ def run_cell(
     parameters = as_described(believed) if plant == "described-sensors" else believed
     setting: Arguments = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
     if told and PLANTS[plant] is True:
-        result = evaluate_told(environment, controller, parameters, range(seed, seed + episodes), setting)
+        result = evaluate_privileged(environment, controller, parameters, range(seed, seed + episodes), setting)
     else:
         law = make_controller(controller, believed, **({"policy": SHIPPED / policy} if policy else {}))
         result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)

@@ -7,8 +7,8 @@ from agents.policy.seeds import policy_folders
 from baselines.bench.statistics import number
 from baselines.registry import resolved, uses_force
 from lab.studies.comparison.grid import LEARNED, Conditions
+from lab.studies.comparison.privileged import TOLD
 from lab.studies.comparison.tables import Figures, controllers_of
-from lab.studies.comparison.told import TOLD
 from lab.studies.tables import markdown
 
 COLUMNS = {

@@ -51,7 +51,7 @@ Key = tuple[str, Conditions, str]
 """What the figures call it, where it is measured, and which of its training seeds it is, if it was trained."""
 
 
-Wanted = Callable[[str, Conditions], bool]
+JointReference = Callable[[str, Conditions], bool]
 """Whether a controller, by name, is measured under some conditions."""
 
 
@@ -65,7 +65,7 @@ def with_own_hand(name: str, where: Conditions) -> bool:
     return not where.hand
 
 
-def cells(options: Options, wanted: Wanted = anywhere) -> dict[Key, Task]:
+def cells(options: Options, wanted: JointReference = anywhere) -> dict[Key, Task]:
     """The pieces: every controller under all conditions that the options leave and that are ``wanted``."""
     rig = load_parameters(options.parameters or None)
     conditions = all_conditions(options.env, options.sensors, options.plant)
@@ -183,7 +183,7 @@ def pictures(content: Content, folder: Path) -> list[Path]:
 def comparison(
     name: str,
     show: Callable[[Content], dict[str, str]] | None = None,
-    wanted: Wanted = anywhere,
+    wanted: JointReference = anywhere,
     draw: Callable[[Content, Path], list[Path]] = no_pictures,
     **options: Any,
 ) -> Study:

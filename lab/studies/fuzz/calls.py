@@ -123,7 +123,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
     from birthsim_env.registry import entries
 
     parts = (
-        *(references.Circle, references.Path, references.Hold, stiffness_schedules.StiffnessSchedule),
+        *(references.Circle, references.Path, references.FixedTarget, stiffness_schedules.StiffnessSchedule),
         *(
             user_forces.ForceProfile,
             user_forces.AlternatingSteps,

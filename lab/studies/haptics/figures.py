@@ -30,7 +30,7 @@ from lab.studies.stability.figure import stability_figure
 
 Runs = Sequence[dict[str, Any]]
 
-LOOKS = tuple({"color": COLOURS[k], "ls": LINES[j]} for k, j in ((0, 0), (1, 2), (5, 3), (4, 0)))
+LINE_STYLES = tuple({"color": COLOURS[k], "ls": LINES[j]} for k, j in ((0, 0), (1, 2), (5, 3), (4, 0)))
 """Of the kinds of sensors."""
 
 
@@ -59,7 +59,7 @@ def bode_figure(runs: Runs, folder: Path) -> list[Path]:
         figure, panels = _panels(2, len(laws))
         for column, law in enumerate(laws):
             above, below = panels[:, column]
-            for style, run in zip(LOOKS, _of(runs, law), strict=False):
+            for style, run in zip(LINE_STYLES, _of(runs, law), strict=False):
                 stiffness, curves = _curves(run)
                 for axes, name in ((above, "magnitude"), (below, "phase")):
                     low, middle, high = _numbers(curves[name])
@@ -92,7 +92,7 @@ def energy_figure(runs: Runs, folder: Path) -> list[Path]:
         figure, panels = _panels(2, len(laws))
         for column, law in enumerate(laws):
             above, below = panels[:, column]
-            for style, run in zip(LOOKS, _of(runs, law), strict=False):
+            for style, run in zip(LINE_STYLES, _of(runs, law), strict=False):
                 stiffness, curves = _curves(run)
                 energy, (middle, least) = _numbers(curves["energy"]), _numbers(curves["damping"])
                 above.plot(np.arange(len(energy)) * curves["energy_period"], energy, **style, label=f"{run['sensors']} sensors")
@@ -124,7 +124,7 @@ def release_figure(runs: Runs, folder: Path) -> list[Path]:
     with plt.rc_context(STYLE):
         figure, panels = _panels(1, len(laws), height=2.6)
         for axes, law in zip(panels[0], laws, strict=True):
-            for style, run in zip(LOOKS, _of(runs, law), strict=False):
+            for style, run in zip(LINE_STYLES, _of(runs, law), strict=False):
                 curves = run["release"][0]["curves"]
                 middle, least, largest = _numbers(curves["offset_mm"])
                 axes.plot(curves["time"], middle, **style, label=f"{run['sensors']} sensors")

@@ -8,7 +8,7 @@ from matplotlib import pyplot as plt
 from baselines.figures.style import ACCENT, DARK, LINES, PAGE, STYLE, headline, legend_below, log_ticks, save
 from lab.studies.responses.study import CURVES, DRAWN, FREQUENCY
 
-LOOKS = {
+LINE_STYLES = {
     ("sliding", "low"): {"color": DARK, "ls": LINES[0]}, ("stuck", "low"): {"color": DARK, "ls": LINES[1]},
     ("sliding", "high"): {"color": ACCENT, "ls": LINES[2]}, ("stuck", "high"): {"color": ACCENT, "ls": LINES[3]},
 }  # fmt: skip
@@ -20,7 +20,7 @@ def responses_figure(figures: dict[str, Any], folder: Path) -> list[Path]:
         figure, axes = plt.subplots(2, len(figures), figsize=(PAGE, 3.8), sharex=True, layout="constrained")
         for (above, below), (title, curves) in zip(axes.T, figures.items(), strict=True):
             for one in curves:
-                style = LOOKS[one["friction"], one["stiffness"]]
+                style = LINE_STYLES[one["friction"], one["stiffness"]]
                 label = f"{one['friction']} pistons, {one['stiffness']} stiffness"
                 above.loglog(FREQUENCY[::DRAWN], one["magnitude"], label=label, **style)
                 below.semilogx(FREQUENCY[::DRAWN], one["phase"], **style)

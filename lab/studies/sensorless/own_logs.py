@@ -16,7 +16,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.comparison.grid import as_described
 from lab.studies.haptics.worlds import Condition
 from lab.studies.sensorless.measures import felt
-from lab.studies.sensorless.told import Told
+from lab.studies.sensorless.privileged import Privileged
 
 SENSORS = "honest"
 
@@ -27,8 +27,8 @@ class Informed(Condition):
 
     told: Sequence[Parameters] = ()
 
-    def law(self) -> Told:
-        return Told([cast(StagedController, make_controller(self.controller, rig)) for rig in self.told])
+    def law(self) -> Privileged:
+        return Privileged([cast(StagedController, make_controller(self.controller, rig)) for rig in self.told])
 
 
 def identified(duration: float, seed: int) -> Result:

@@ -25,8 +25,8 @@ def stiffest(controller: str, mass: float, valve: float, latency: float) -> Resu
 def rests_up_to(name: str, rig: Parameters, sensors: str) -> float:
     """N/m: the last of ``ASKED`` before the first at which the law swings, without its own bound; infinite where none does."""
     law, still = cast(StagedController, make_controller(name, rig)), np.zeros(len(ASKED))
-    stages = law.law_stages
-    law.law_stages = lambda sampled: stages(sampled)[1:]  # type: ignore[method-assign]
+    stages = law.controller_stages
+    law.controller_stages = lambda sampled: stages(sampled)[1:]  # type: ignore[method-assign]
     verdict = judge(Cases([rig] * len(ASKED), still, ASKED, still, still), law, sensors, 0, None)
     swings = verdict.lost | (verdict.motion > SWING)
     return float(ASKED[max(int(np.argmax(swings)) - 1, 0)]) if swings.any() else np.inf

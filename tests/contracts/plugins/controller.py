@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from baselines.staged import LawStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.records import Numbers, number
@@ -36,5 +36,5 @@ def push(world: int, seen: Seen, memory: int, gain: Gain, tables: int, lane: int
 
 
 class Compiled(StagedController):
-    def law_stages(self, sampled):
-        return [LawStage(push, Gain.numbers(gain=GAIN), np.zeros(0))]
+    def controller_stages(self, sampled):
+        return [ControllerStage(push, Gain.numbers(gain=GAIN), np.zeros(0))]

@@ -14,11 +14,11 @@ class Step(Numbers):
 
 
 @kernel
-def coarse(world: World, seen: Seen, memory: int, about: Step, tables: int, lane: int, n: int):
+def coarse(world: World, seen: Seen, memory: int, constants: Step, tables: int, lane: int, n: int):
     ideal_stage(world, seen, memory, 0, tables, lane, n)
     for axis in range(2):
         for i in range(n):
-            seen.position[axis, i] = about.step * np.floor(seen.position[axis, i] / about.step + 0.5)
+            seen.position[axis, i] = constants.step * np.floor(seen.position[axis, i] / constants.step + 0.5)
     return 0
 
 

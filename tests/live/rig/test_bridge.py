@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from birthsim_build.stages import LEAST_TIME, PACE
-from birthsim_env import Circle, Hold, Parameters
+from birthsim_env import Circle, FixedTarget, Parameters
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.geometry import inverse_geometry
 from tests.live.rig.course import Course
@@ -17,7 +17,7 @@ def test_a_bridge_meets_both_ends_and_its_derivatives_are_true():
     course, there, begins = Course(Circle()), np.array([0.42, 0.03]), 0.8
     course.follow(Circle(radius=0.06), 0.6)
     before = course.sample(begins)
-    course.follow(Hold(tuple(there)), begins)
+    course.follow(FixedTarget(tuple(there)), begins)
     lasts = LEAST_TIME + float(np.linalg.norm(before[:2] - there)) / PACE
     offset = np.concatenate([there, np.zeros(6)])
     assert course.sample(begins) == pytest.approx(before, rel=1e-12, abs=1e-12)

@@ -12,13 +12,13 @@ from birthsim_env.assembly import Arguments
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.sensorless.told import Told
+from lab.studies.sensorless.privileged import Privileged
 
 TOLD = "told:"
 """Before the name of such a controller."""
 
 
-def can_be_told(controller: str, rig: Parameters) -> bool:
+def can_be_privileged(controller: str, rig: Parameters) -> bool:
     """Whether a controller is stages alone, whose constants can differ from lane to lane."""
     made = make_controller(controller, rig)
     if not isinstance(made, StagedController) or made.asks or not made.is_compiled():
@@ -26,17 +26,19 @@ def can_be_told(controller: str, rig: Parameters) -> bool:
     return type(made).policy_stages is StagedController.policy_stages
 
 
-def told_law(controller: str, rig: Parameters, seeds: Sequence[int]) -> Told:
+def privileged_controller(controller: str, rig: Parameters, seeds: Sequence[int]) -> Privileged:
     """``controller`` in as many lanes as ``seeds``, each told the plant that its world draws about ``rig``.
 
     Of the sensors it believes what ``rig`` says.
     """
     ranges = documented_ranges(rig)
     drawn = [draw_parameters(rig, ranges, stream(seed, 0, "parameters")) for seed in seeds]
-    return Told([cast(StagedController, make_controller(controller, one)) for one in drawn])
+    return Privileged([cast(StagedController, make_controller(controller, one)) for one in drawn])
 
 
-def evaluate_told(environment: str, controller: str, rig: Parameters, seeds: Sequence[int], setting: Arguments) -> Evaluation:
+def evaluate_privileged(
+    environment: str, controller: str, rig: Parameters, seeds: Sequence[int], setting: Arguments
+) -> Evaluation:
     """``evaluate`` in the worlds of ``seeds``, where ``setting`` randomises the rig, under a controller that is told each.
 
     A law that knows a light rig or slow valves may refuse a world's stiffness setpoint: that world counts as lost.
@@ -48,11 +50,8 @@ def evaluate_told(environment: str, controller: str, rig: Parameters, seeds: Seq
 
 def _parts(environment: str, controller: str, rig: Parameters, seeds: Sequence[int], setting: Arguments) -> list[Evaluation]:
     try:
-        return [
-            evaluate(
-                environment, told_law(controller, rig, seeds), controller, len(seeds), seeds[0], progress=False, **setting
-            )
-        ]  # fmt: skip
+        controllers = privileged_controller(controller, rig, seeds)
+        return [evaluate(environment, controllers, controller, len(seeds), seeds[0], progress=False, **setting)]
     except ValueError as error:
         if "reference.stiffness" not in str(error):
             raise

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from agents.residual import authority, insight, unexplained
-from agents.residual.pistons import Found, observed
+from agents.residual import authority, features, unexplained
+from agents.residual.pistons import ObservedPistons, observed
 from agents.residual.settings import NO_LAW, ResidualSettings
 from baselines.controller import require_stiffness
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
-from baselines.staged import CompiledDriving, LawStage, StagedController
+from baselines.staged import CompiledDriving, ControllerStage, StagedController
 from birthsim_env.loop.rows import ACTION, SHOWN, Seen
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import scratch
@@ -71,10 +71,10 @@ def action_names(settings: ResidualSettings) -> tuple[str, ...]:
 
 
 def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
-    """What each row of ``ResidualLaw.memory`` says."""
+    """What each row of ``CorrectedController.memory`` says."""
     smooth = (f"smoothed action: {name}" for name in action_names(settings))
     left = (f"fraction of the authority on cylinder {i}, 1" for i in (1, 2))
-    return (*smooth, *left, *UNEXPLAINED, *(insight.ENTRIES if settings.informed else ()))
+    return (*smooth, *left, *UNEXPLAINED, *(features.ENTRIES if settings.informed else ()))
 
 
 def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ class Constants(Numbers):
     has_law = number("1", "1 with a law")
     stiffens = number("1", "1 where the impedance has a stiffness")
     damps = number("1", "1 where it has a damping")
-    told = number("1", "how many entries of ``insight.Insight`` are shown")
+    told = number("1", "how many entries of ``features.EstimatorFeatures`` are shown")
     period = number("s", "control period")
     rig = part(Rig, "the rig as described")
 
@@ -144,28 +144,32 @@ def stiffen(force: Array, powers: Array, asked: Reference, n: int) -> None:
 
 
 @helper
-def _correct(action: Array, limiter: authority.Limiter, about: Constants, smooth: Action, said: Correction, n: int) -> None:
+def _correct(action: Array, limiter: authority.Limiter, constants: Constants, smooth: Action, said: Correction, n: int) -> None:
     """Writes what actions (size, n) say; ``smooth`` goes on by one period towards them."""
-    size, most, left = action.shape[0], about.authority, limiter.left
+    size, most, left = action.shape[0], constants.authority, limiter.left
     for i in range(n):
         for k in range(2):
             strength = most * left[k, i]
             said.force[k, i] = strength * smooth.force[k, i]
-            said.rate[k, i] = strength / about.time_constant * (action[k, i] - smooth.force[k, i])
+            said.rate[k, i] = strength / constants.time_constant * (action[k, i] - smooth.force[k, i])
             said.powers[k, i] = max(smooth.powers[k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
         said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth.damping[i], 0.0)) if size > 4 else 0.0
         for k in range(size):
-            smooth.rows[k, i] += about.quickness * (action[k, i] - smooth.rows[k, i])
+            smooth.rows[k, i] += constants.quickness * (action[k, i] - smooth.rows[k, i])
 
 
 @kernel
-def _stage(world: int, seen: Seen, memory: Memory, about: Constants, tables: int, lane: int, n: int) -> int:
-    size, found, said = int(about.actions), Found(seen.handed[: Found.size]), Correction(scratch(Correction.size))
-    unexplained.remember(found.joints, found.disturbance, about.rig, about.period, memory.moved, memory.unexplained, n)
+def _stage(world: int, seen: Seen, memory: Memory, constants: Constants, tables: int, lane: int, n: int) -> int:
+    size, found, said = (
+        int(constants.actions),
+        ObservedPistons(seen.intermediate[: ObservedPistons.size]),
+        Correction(scratch(Correction.size)),
+    )
+    unexplained.remember(found.joints, found.disturbance, constants.rig, constants.period, memory.moved, memory.unexplained, n)
     limiter, action, shown = memory.limiter, seen.action[:size], seen.shown
     asked, target = seen.asked, seen.reference
-    authority.limit_authority(found.joints, target, about.rig, about.period, about.level, limiter, n)
-    _correct(action, limiter, about, memory.smooth, said, n)
+    authority.limit_authority(found.joints, target, constants.rig, constants.period, constants.level, limiter, n)
+    _correct(action, limiter, constants, memory.smooth, said, n)
     for i in range(n):
         for k in range(Reference.size):
             asked.rows[k, i] = target.rows[k, i]
@@ -175,19 +179,21 @@ def _stage(world: int, seen: Seen, memory: Memory, about: Constants, tables: int
             seen.feedforward.force[k, i], seen.feedforward.rate[k, i] = said.force[k, i], said.rate[k, i]
             said.powers[k, i] = said.powers[k, i] - limiter.softness[i]
             shown[size + k, i] = limiter.left[k, i]
-        seen.damping_factor[i] = said.damping_factor[i] if about.damps > 0.0 else 0.0
+        seen.damping_factor[i] = said.damping_factor[i] if constants.damps > 0.0 else 0.0
         for k in range(unexplained.Forces.size):
-            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, memory.unexplained.rows[k, i] / about.unit))
-        for k in range(int(about.told)):
-            shown[size + 2 + unexplained.Forces.size + k, i] = max(-LIMIT, min(LIMIT, seen.handed[Found.size + k, i]))
-        for valve in range(4 if about.has_law == 0.0 else 0):
+            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, memory.unexplained.rows[k, i] / constants.unit))
+        for k in range(int(constants.told)):
+            shown[size + 2 + unexplained.Forces.size + k, i] = max(
+                -LIMIT, min(LIMIT, seen.intermediate[ObservedPistons.size + k, i])
+            )
+        for valve in range(4 if constants.has_law == 0.0 else 0):
             seen.opening[valve, i] = action[valve, i]
-    if about.stiffens > 0.0:
+    if constants.stiffens > 0.0:
         stiffen(seen.user_force, said.powers, asked, n)
     return 0
 
 
-class ResidualLaw(StagedController):
+class CorrectedController(StagedController):
     """A law with a residual over N lanes: ``accept`` takes the actions (size, N) of a policy step."""
 
     asks = True
@@ -200,7 +206,7 @@ class ResidualLaw(StagedController):
         self.action: Array = np.zeros((settings.size, 0))
         self.shown: Array = np.zeros((len(memory_names(settings)), 0))
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         settings, board = self.settings, self.parameters.electronics
         constants = Constants.numbers(
             actions=settings.size,
@@ -214,14 +220,14 @@ class ResidualLaw(StagedController):
             quickness=1.0 - exact.number("exp", -board.control_period / settings.time_constant),
             stiffens=settings.impedance != "fixed",
             damps=settings.impedance == "variable",
-            told=insight.Insight.size if settings.informed else 0,
+            told=features.EstimatorFeatures.size if settings.informed else 0,
         )
-        own = LawStage(_stage, constants, Memory.lane(limiter=authority.Limiter.lane(left=1.0)))
+        own = ControllerStage(_stage, constants, Memory.lane(limiter=authority.Limiter.lane(left=1.0)))
         known = [observed(self.parameters, sampled)]
         if settings.informed:
-            known = insight.informed(self.parameters, sampled, settings.force_sensor)
+            known = features.informed(self.parameters, sampled, settings.force_sensor)
         self._place = len(known)
-        return [*known, own, *(self._law.law_stages(sampled) if self._law is not None else ())]
+        return [*known, own, *(self._law.controller_stages(sampled) if self._law is not None else ())]
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """What the law underneath means to render, over N lanes; None without a law."""
@@ -276,12 +282,12 @@ class ResidualLaw(StagedController):
 
 
 class ResidualActuation(CompiledDriving):
-    """``ResidualLaw`` as an actuation of the environments: the law runs inside, at the control rate."""
+    """``CorrectedController`` as an actuation of the environments: the law runs inside, at the control rate."""
 
-    controller: ResidualLaw
+    controller: CorrectedController
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
-        super().__init__(ResidualLaw(parameters, settings), None, {})
+        super().__init__(CorrectedController(parameters, settings), None, {})
         self.size, self.names, self.memory_names = settings.size, action_names(settings), memory_names(settings)
 
     @property

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.residual.insight import SCALES, Insight
+from agents.residual.features import SCALES, EstimatorFeatures
 from birthsim_env.loop.signals import Reference
 from birthsim_env.observation import LIMIT
 
@@ -20,11 +20,11 @@ def test_what_is_shown_is_true_with_exact_sensors(law, reach):
         simulation = env.simulation
         motion, reference, force = simulation.motion, simulation.reference, simulation.force
         seen, *_ = env.step(rng.uniform(-reach, reach, env.action_space.shape).astype(np.float32))
-        told = Insight(seen[:, -Insight.size :].T * SCALES[:, None])
+        told = EstimatorFeatures(seen[:, -EstimatorFeatures.size :].T * SCALES[:, None])
         given = Reference(reference.rows).compliant_target(force)
-        error = np.clip(motion[:2] - given - told.owed, -LIMIT * SCALES[0], LIMIT * SCALES[0])
+        error = np.clip(motion[:2] - given - told.lag, -LIMIT * SCALES[0], LIMIT * SCALES[0])
         np.testing.assert_allclose(error, told.error, atol=1e-8)
         rate = np.clip(motion[2:] - reference.velocity - told.velocity, -LIMIT * SCALES[2], LIMIT * SCALES[2])
         np.testing.assert_allclose(rate, told.error_rate, atol=1e-6)
-        largest = max(largest, float(np.abs(told.owed).max()))
+        largest = max(largest, float(np.abs(told.lag).max()))
     assert largest > 1e-4, "a pushed mass comes late"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from baselines.impedance import Impedance, declared_by
-from baselines.staged import LawStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import address_of, call, numbers
 from birthsim_env.physics.compiled.compilation import kernel
@@ -29,19 +29,19 @@ def each(world: int, seen: int, memory: int, constants: int, tables: int, lane: 
     return missed
 
 
-class Told(StagedController):
+class Privileged(StagedController):
     """``laws``, one a lane, of the same stages with other constants, as one compiled law."""
 
     def __init__(self, laws: Sequence[StagedController]) -> None:
         super().__init__(laws[0].parameters)
         self._laws = laws
 
-    def law_stages(self, sampled: bool) -> list[LawStage]:
-        stages = list(zip(*(law.law_stages(sampled) for law in self._laws), strict=True))
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
+        stages = list(zip(*(law.controller_stages(sampled) for law in self._laws), strict=True))
         self._fresh = [_abreast([one.fresh for one in lanes]) for lanes in stages]
         heads = [[address_of(lanes[0].function), len(lanes[0].constants)] for lanes in stages]
         return [
-            LawStage(
+            ControllerStage(
                 each,
                 np.concatenate([np.array(head, dtype=np.float64), *(one.constants for one in lanes)]),
                 fresh[:, 0],

@@ -5,11 +5,11 @@ Its observers run beside whatever drives the valves: they see the same measureme
 
 import numpy as np
 
-from agents.residual.pistons import Found
-from baselines.admittance import knowledge
+from agents.residual.pistons import ObservedPistons
+from baselines.admittance import estimator
 from baselines.admittance.controller import AdmittanceController
-from baselines.admittance.rows import Beliefs, Known, Memory
-from baselines.staged import LawStage
+from baselines.admittance.rows import Estimate, EstimatorParameters, Memory
+from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference, compliance
 from birthsim_env.loop.stage import block, scratch
@@ -20,12 +20,12 @@ from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
 
-class Insight(Rows):
+class EstimatorFeatures(Rows):
     """What is shown. The motion is the one that the hand should find, with the controller's mass and damping."""
 
     error = rows("x y", "m", "end effector, estimated, from the motion, {}")
     error_rate = rows("x y", "m/s", "rate of that error, {}")
-    owed = rows("x y", "m", "motion from the compliant target, {}")
+    lag = rows("x y", "m", "motion from the compliant target, {}")
     velocity = rows("x y", "m/s", "velocity of the motion, from the target's, {}")
     acceleration = rows("x y", "m/s2", "acceleration of the motion, from the target's, {}")
     unseen = rows("1 2", "N", "force unseen on piston {}: friction believed, and what is observed besides")
@@ -36,29 +36,33 @@ SCALES = np.repeat([1e-3, 0.02, 5e-3, 0.1, 2.0, 20.0, 20.0], 2)
 """What maps to 1."""
 
 ENTRIES = tuple(
-    str(Entry(about.format(name), unit, scale)) for (name, unit, about, _), scale in zip(Insight.entries(), SCALES, strict=True)
+    str(Entry(about.format(name), unit, scale))
+    for (name, unit, about, _), scale in zip(EstimatorFeatures.entries(), SCALES, strict=True)
 )
 
 
-class About(Beliefs):
+class Constants(EstimatorParameters):
     """Constants of the stage."""
 
-    scales = rows(Insight.size, "SI", "what maps to 1")
+    scales = rows(EstimatorFeatures.size, "SI", "what maps to 1")
 
 
 @kernel
-def _know(world: int, seen: Seen, memory: int, about: About, tables: int, lane: int, n: int) -> int:
-    signals, known, p = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n]), about.belief.rig
-    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+def _estimate(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
+    signals, estimate, p = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n]), constants.model.rig
+    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
     for i in range(n):
         for valve in range(4):
             own.chambers.opening[valve, i] = signals.opening[valve, i]
         for k in range(Reference.size):
             signals.asked.rows[k, i] = signals.reference.rows[k, i]
         signals.damping_factor[i] = 0.0
-    missed = knowledge.know(signals, own, known, about)
-    found, told = Found(signals.handed[: Found.size]), Insight(signals.handed[Found.size : Found.size + Insight.size])
-    motion, target = known.motion, signals.reference
+    missed = estimator.estimate(signals, own, estimate, constants)
+    found, told = (
+        ObservedPistons(signals.intermediate[: ObservedPistons.size]),
+        EstimatorFeatures(signals.intermediate[ObservedPistons.size : ObservedPistons.size + EstimatorFeatures.size]),
+    )
+    motion, target = estimate.motion, signals.reference
     for i in range(n):
         y1, y2 = own.joints.position[0, i], own.joints.position[1, i]
         v1, v2 = own.joints.speed[0, i], own.joints.speed[1, i]
@@ -67,25 +71,28 @@ def _know(world: int, seen: Seen, memory: int, about: About, tables: int, lane: 
         )
         x, y = r2 * sine, -r2 * cosine
         vx, vy = v2 * sine - kappa * v1 * cosine, -v2 * cosine - kappa * v1 * sine
-        hand, stiffness = known.given.force, target.stiffness
-        given = compliance(hand[0, i], hand[1, i], stiffness[0, i], stiffness[1, i], target.stiffness_coupling[i])
+        hand, stiffness = estimate.inputs.force, target.stiffness
+        offset = compliance(hand[0, i], hand[1, i], stiffness[0, i], stiffness[1, i], target.stiffness_coupling[i])
         told.error[0, i], told.error[1, i] = x - motion.position[0, i], y - motion.position[1, i]
         told.error_rate[0, i], told.error_rate[1, i] = vx - motion.velocity[0, i], vy - motion.velocity[1, i]
         for axis in range(2):
-            told.owed[axis, i] = motion.position[axis, i] - target.position[axis, i] - given[axis]
+            told.lag[axis, i] = motion.position[axis, i] - target.position[axis, i] - offset[axis]
             told.velocity[axis, i] = motion.velocity[axis, i] - target.velocity[axis, i]
             told.acceleration[axis, i] = motion.acceleration[axis, i] - target.acceleration[axis, i]
         mass = own.inertia.mass[i]
         for k in range(2):
             found.joints.position[k, i], found.joints.speed[k, i] = own.joints.position[k, i], own.joints.speed[k, i]
-            found.disturbance[k, i] = known.unexplained[k, i] / (mass * kappa * kappa if k == 0 else mass)
-            told.unseen[k, i], told.friction[k, i] = known.unseen[k, i], known.drag[k, i]
-        for k in range(Insight.size):
-            told.rows[k, i] /= about.scales[k]
+            found.disturbance[k, i] = estimate.unexplained[k, i] / (mass * kappa * kappa if k == 0 else mass)
+            told.unseen[k, i], told.friction[k, i] = estimate.unseen[k, i], estimate.drag[k, i]
+        for k in range(EstimatorFeatures.size):
+            told.rows[k, i] /= constants.scales[k]
     return missed
 
 
-def informed(rig: Parameters, sampled: bool, force_sensor: bool) -> list[LawStage]:
-    """The stages that know, in place of ``pistons.observed``; ``Insight``, over its ``SCALES``, follows ``Found``."""
-    *before, law = AdmittanceController(rig, force_sensor).law_stages(sampled)
-    return [*before, LawStage(_know, np.concatenate([law.constants[: Beliefs.size], SCALES]), law.fresh)]
+def informed(rig: Parameters, sampled: bool, force_sensor: bool) -> list[ControllerStage]:
+    """The stages of the estimator, in place of ``pistons.observed``.
+
+    ``EstimatorFeatures``, over its ``SCALES``, follows ``ObservedPistons``.
+    """
+    *before, law = AdmittanceController(rig, force_sensor).controller_stages(sampled)
+    return [*before, ControllerStage(_estimate, np.concatenate([law.constants[: EstimatorParameters.size], SCALES]), law.fresh)]

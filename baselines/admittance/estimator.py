@@ -1,0 +1,182 @@
+"""The estimator of the admittance controller: one call a control period, in the order of its functions.
+
+- read_sensors: the hand's force and the noise of the tracker, as measured and believed or as learned;
+- admittance.update_motion: the motion that the hand should find;
+- predict: spools, pressures and the friction along that motion;
+- correct: positions and speeds of the pistons, and what accelerates them without being known;
+- adapt: the level of friction from what is left unexplained, and without a force sensor the hand's force.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from baselines.admittance.rows import Estimate, EstimatorParameters, Follower, Memory, OscillationDetector
+from baselines.estimation import (
+    admittance,
+    chamber_observer,
+    disturbance_observer,
+    friction_level,
+    inertia,
+    observers,
+    reference_friction,
+    stages,
+    tracker_noise,
+)
+from baselines.estimation.friction_level import Friction
+from baselines.estimation.hand import bristle_observer, force_bias, force_observer, inertial_force
+from baselines.estimation.inertia import Inertia
+from baselines.estimation.inertial import Moving
+from birthsim_env.loop.rows import POSITION, Seen
+from birthsim_env.loop.signals import Point
+from birthsim_env.physics import geometry
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
+
+BELIEVED_LIMIT, BELIEVED_HAND = 120.0, 400.0
+"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below the first.
+Below the second are 7 kg on a small bore and, unseen without a force sensor, the strongest hand."""
+
+
+@helper
+def read_sensors(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+    """The hand's force and the noise of a sample. What no force sensor measures of the hand, the observers find."""
+    noise, hand, lanes = estimate.inputs.noise, estimate.hand, memory.fresh.shape[0]
+    inverse_mass = estimate.inputs.inverse_mass
+    for i in range(lanes):
+        noise[i], inverse_mass[i] = constants.model.noise, 1.0 / memory.inertia.mass[i]
+        for k in range(2):
+            hand[k, i] = seen.user_force[k, i] if constants.force_sensor > 0.0 else memory.hand.force[k, i]
+    if constants.learns_noise > 0.0:
+        tracker_noise.observe(memory.tracker, seen, constants.model.noise, memory.fresh)
+        for i in range(lanes):
+            noise[i] = math.sqrt(memory.tracker.variance[i])
+    if constants.most_bias > 0.0:
+        steady, period = force_bias.STEADY, constants.model.period
+        force_bias.tare(memory.bias, seen.time, seen.user_force, constants.most_bias, steady, period, hand)
+    for i in range(lanes):
+        for k in range(2):
+            estimate.inputs.force[k, i] = hand[k, i] if constants.force_sensor + constants.weighed > 0.0 else 0.0
+
+
+@helper
+def predict(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+    """Valves and chambers, and the friction that is there along the motion."""
+    p, period = constants.model.rig, constants.model.period
+    chamber_observer.observe(memory.chambers, seen.pressure, memory.joints, p, period, constants.trust, memory.fresh)
+    reference_friction.update_bristle(estimate.motion, p, period, memory.bristle, estimate.drag)
+    for i in range(memory.fresh.shape[0]):
+        for k in range(2):
+            level = constants.friction_fraction * memory.friction.level[k, i]
+            estimate.inputs.believed[k, i] = -level * estimate.drag[k, i]
+
+
+@helper
+def correct(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+    """The pistons, and what accelerates them unseen."""
+    joints, pistons = memory.joints, memory.pistons
+    inputs, assumed = estimate.inputs, constants.model
+    lanes, place, p = memory.fresh.shape[0], int(constants.place), assumed.rig
+    if constants.sampled > 0.0:
+        observers.observe(pistons, seen, memory.chambers.pressure, inputs, assumed)
+        for k in range(2):
+            for i in range(lanes):
+                joints.position[k, i], joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
+    else:
+        point = Point(seen.rows[place : place + Point.size])
+        disturbance_observer.observe(pistons, point, memory.chambers.pressure, inputs, assumed, joints, lanes)
+    for i in range(lanes):
+        _, _, _, _, _, kappa, sine, cosine = geometry.pose(
+            joints.position[0, i],
+            joints.position[1, i],
+            p.k1,
+            p.k2,
+            p.d_squares,
+            p.d_product,
+            p.sin_gamma3,
+            p.cos_gamma3,
+        )
+        mass = memory.inertia.mass[i]
+        for k in range(2):
+            found = (mass * kappa * kappa if k == 0 else mass) * pistons.disturbance[k, i]
+            estimate.unexplained[k, i] = inputs.believed[k, i] + found
+            estimate.unseen[k, i] = inputs.believed[k, i] + max(-constants.believed_limit, min(constants.believed_limit, found))
+        if constants.learns_mass > 0.0:
+            pose, pressures = (kappa, sine, cosine), memory.chambers.pressure
+            inertia.learn(memory.inertia, i, pose, pistons, pressures, inputs, assumed, memory.fresh)
+
+
+@helper
+def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+    """The level of friction and, without a force sensor, the hand's force, for the next period."""
+    fresh, assumed, joints = memory.fresh, constants.model, memory.joints
+    if constants.friction_rate > 0.0:
+        friction_level.learn(
+            memory.friction, estimate.drag, joints, estimate.unexplained, constants.friction_rate, assumed, fresh
+        )
+    pressures, noise, hand, contact = memory.chambers.pressure, estimate.inputs.noise, memory.hand, memory.contact
+    if constants.weighed > 0.0:
+        place = int(constants.place)
+        moving = Moving(seen.rows[place : place + Moving.size])
+        inertial_force.observe(hand, contact, memory.rest_detector, seen, moving, joints, pressures, noise, assumed, fresh)
+    elif constants.identified > 0.0:
+        bristle_observer.observe(hand, contact, seen, joints, pressures, noise, assumed, fresh)
+    elif constants.force_sensor == 0.0:
+        force_observer.observe(hand, seen.time, joints, estimate.unexplained, assumed.rig, assumed.period, fresh)
+
+
+@helper
+def estimate(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> int:
+    """Carries ``memory`` on by one control period and writes ``estimate``, over the lanes of a block.
+
+    Returns how many stiffness setpoints are not positive definite.
+    """
+    read_sensors(seen, memory, estimate, constants)
+    missed = admittance.update_motion(
+        memory.offset, seen.asked, estimate.hand, constants.compliance, seen.damping_factor, estimate.motion
+    )
+    admittance.mark_moving(estimate.motion, estimate.inputs.moving)
+    predict(seen, memory, estimate, constants)
+    correct(seen, memory, estimate, constants)
+    adapt(seen, memory, estimate, constants)
+    for i in range(memory.fresh.shape[0]):
+        memory.fresh[i] = 0.0
+    return missed
+
+
+def fresh_memory(rig: Parameters, sampled: bool) -> Array:
+    """``Memory`` of a lane that starts."""
+    whole, pistons = OscillationDetector.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
+    follower = Follower.lane(across=whole, along=whole, rest_across=whole, rest_along=whole)
+    mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
+    return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
+
+
+def estimator_parameters(
+    rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, float], **others: float
+) -> dict[str, Any]:
+    """``EstimatorParameters`` in a rig by name: with a force sensor and nothing learned, where ``others`` do not say otherwise.
+
+    ``gains`` has bandwidth and friction_fraction and, where cells are ``noisy``, pressure_bandwidth, 1/s.
+    """
+    width = gains["pressure_bandwidth"] if noisy else math.inf
+    return {
+        "model": observers.assumed_parameters(rig, gains["bandwidth"]),
+        "compliance": stages.compliance(rig),
+        "place": POSITION,
+        "sampled": sampled,
+        "force_sensor": True,
+        "learns_noise": False,
+        "rows_of_memory": len(fresh_memory(rig, sampled)),
+        "trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period),
+        "friction_fraction": gains["friction_fraction"],
+        "friction_rate": 0.0,
+        "most_bias": 0.0,
+        "weighed": False,
+        "identified": False,
+        "learns_mass": False,
+        "believed_limit": BELIEVED_LIMIT,
+        **others,
+    }
