@@ -12,7 +12,6 @@
 # make scratch trains PPO from scratch
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
-# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm
 # make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -53,7 +52,7 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links golden clean
+.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml packaging/requirements/base.txt
@@ -152,11 +151,9 @@ lint: $(READY)
 	$(BIN)/ruff check docs/conf.py docs/_generate
 	$(BIN)/ruff format --check docs/conf.py docs/_generate
 
-# CHANGELOG.md tells of the past.
-prose: $(NPM)/.ready
-	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md .github/SECURITY.md .github/CODE_OF_CONDUCT.md lab/paper/paper.md docs
+# What comes from npm: axe-core, with which tests look at pages, and MathJax, which draws the site's equations.
+npm: $(NPM)/.ready
 
-# What comes from npm: the reader of the prose, and axe-core, with which tests look at pages.
 $(NPM)/.ready: packaging/requirements/npm/package.json packaging/requirements/npm/package-lock.json
 	mkdir -p $(NPM)
 	cp packaging/requirements/npm/package.json packaging/requirements/npm/package-lock.json $(NPM)

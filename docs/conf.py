@@ -12,7 +12,6 @@ sys.path[:0] = [str(HERE.parent), str(HERE)]
 
 import _generate  # noqa: E402
 from _generate import notebooks, stages, words  # noqa: E402
-from _generate.figure import figure_role  # noqa: E402
 from _generate.landing import install_role, rig_role  # noqa: E402
 
 import birthsim_env  # noqa: E402
@@ -142,7 +141,7 @@ def build_rig(app, exception):
 
 def setup(app):
     """Write the generated parts before any page is read."""
-    for name, role in {"figure": figure_role, "install": install_role, "rig": rig_role}.items():
+    for name, role in {"install": install_role, "rig": rig_role}.items():
         app.add_role(name, role)
     stages.connect(app)
     app.connect("source-read", seen_from_the_site)

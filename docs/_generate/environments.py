@@ -82,7 +82,7 @@ def _section(scenario: str) -> str:
         "what one meets": SCENARIOS[scenario].about,
         "duration": f"{SCENARIOS[scenario].duration:g} s, {round(SCENARIOS[scenario].duration / 0.01)} steps of 10 ms",
         **_spaces(name),
-        **{f"{kind}, law inside": text for kind, text in _spaces(environment_id(scenario, "Residual")).items()},
+        **{f"{kind}, controller inside": text for kind, text in _spaces(environment_id(scenario, "Residual")).items()},
     }
     rows = [f"| {fact} | {text} |" for fact, text in facts.items()]
     made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]

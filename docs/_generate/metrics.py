@@ -26,7 +26,7 @@ MEANINGS = {
 
 
 def metrics() -> str:
-    """The table, and what its words mean in figures."""
+    """The table, and what its words mean in numbers."""
     rows = [f"| `{name}` | {unit} | {_meaning(name)} |" for name, unit in UNITS.items()]
     return "\n".join(
         [

@@ -5,7 +5,7 @@ from birthsim_live.rig.words import CHOICES, FIGURES
 
 
 def page() -> str:
-    """A table for scenarios, controllers, valves, sensors and figures."""
+    """A table for scenarios, controllers, valves, sensors and numbers."""
     sections = {
         "Scenarios": CHOICES["scenario"],
         "Controllers": {one.name: one.about for one in entries("controller", listed=True)},

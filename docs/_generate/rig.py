@@ -1,4 +1,4 @@
-"""The rig's figures: a table for every section of ``Parameters``."""
+"""The rig's parameters: a table for every section of ``Parameters``."""
 
 import dataclasses
 import math

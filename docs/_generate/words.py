@@ -8,8 +8,9 @@ GLOSSARY = Path(__file__).resolve().parent.parent / "reference" / "glossary.md"
 
 
 def meanings() -> dict[str, str]:
-    """Each word of the glossary's first column with its meaning, without marks of Markdown."""
-    rows = [line.split("|") for line in GLOSSARY.read_text(encoding="utf-8").splitlines() if line.startswith("| ")][1:]
+    """Each word of the glossary's first table with its meaning, without marks of Markdown."""
+    first = GLOSSARY.read_text(encoding="utf-8").partition("\n## ")[0]
+    rows = [line.split("|") for line in first.splitlines() if line.startswith("| ")][1:]
     plain = {words: re.sub(r"\[([^]]*)\]\([^)]*\)|[*`$]", r"\1", meaning).strip() for _, words, meaning, *_ in rows}
     return {word: meaning for words, meaning in plain.items() for word in words.strip().split(", ")}
 

@@ -7,7 +7,7 @@ import pytest
 from tests.live.browser import ROOT
 
 AXE = ROOT / "out" / "npm" / "node_modules" / "axe-core" / "axe.min.js"
-NEEDED = pytest.mark.skipif(not AXE.exists() and os.environ.get("CI") != "true", reason="make prose installs axe-core")
+NEEDED = pytest.mark.skipif(not AXE.exists() and os.environ.get("CI") != "true", reason="make npm installs axe-core")
 
 RUN = """async (without) => {
     const { violations } = await axe.run({ exclude: without }, { resultTypes: ["violations"] });

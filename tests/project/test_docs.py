@@ -1,7 +1,6 @@
-"""The documentation site: pages have their places, generated parts know everything, tables sort, it builds, prose is read."""
+"""The documentation site: pages have their places, generated parts know everything, tables sort, it builds."""
 
 import csv
-import json
 import os
 import re
 import subprocess
@@ -35,7 +34,7 @@ PAGES = {
     if page.parent.name != "data"
 }
 
-FIGURE = re.compile(r"\b\d+\.\d+\b")
+NUMBER = re.compile(r"\b\d+\.\d+\b")
 
 TABLE = """<!doctype html><article><table class="docutils"><thead><tr><th>law</th><th>error, mm</th></tr></thead>
 <tbody>{}</tbody></table></article><script>{}</script>"""
@@ -64,11 +63,11 @@ def test_what_a_toctree_names_is_linked_for_readers_without_one(page):
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("explanation/") and not page.endswith("index")])
-def test_every_figure_of_an_explanation_stands_in_a_page_that_it_links(page):
+def test_every_number_of_an_explanation_stands_in_a_page_that_it_links(page):
     prose = re.sub(r"^```.*?^```", "", PAGES[page], flags=re.MULTILINE | re.DOTALL)
     links = {(DOCS / page).parent / link for link in re.findall(r"\]\(([^)#:]+\.md)", prose)}
-    known = {figure for link in links for figure in FIGURE.findall(with_tables(link))}
-    assert set(FIGURE.findall(prose)) - known == set()
+    known = {number for link in links for number in NUMBER.findall(with_tables(link))}
+    assert set(NUMBER.findall(prose)) - known == set()
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +180,7 @@ def site(tmp_path_factory):
     pytest.importorskip("sphinx")
     pytest.importorskip("myst_nb")
     if not axe.AXE.exists() and os.environ.get("CI") != "true":
-        pytest.skip("the site's equations need what make prose installs from npm")
+        pytest.skip("the site's equations need what make npm installs")
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", str(DOCS), str(folder)]
     given = {**os.environ, "BIRTHSIM_REPOSITORY": "someone/birthsim"}
@@ -235,21 +234,6 @@ def test_equations_are_drawn_from_a_file_of_the_site(site, page_of):
             assert written > 0, name
             page.wait_for_function(f"document.querySelectorAll('mjx-container').length == {written}")
             assert page.locator(drawn).count() == written, name
-
-
-TEXTLINT = ROOT / "out" / "npm" / "node_modules" / ".bin" / "textlint"
-UNREAD = "<!-- textlint-disable -->\n\nA title with set points.\n\n<!-- textlint-enable -->\n"
-CONFIGURATION = DOCS / "_prose" / ".textlintrc.js"
-
-
-@pytest.mark.skipif(not TEXTLINT.exists() and os.environ.get("CI") != "true", reason="make prose installs textlint")
-def test_other_names_and_long_sentences_are_found(tmp_path):
-    long = " ".join(["word"] * 45)
-    (tmp_path / "page.md").write_text(f"The `set point` is code.\n\nSet points have one name.\n\nA {long}.\n\n{UNREAD}")
-    command = [str(TEXTLINT), "--config", str(CONFIGURATION), "--format", "json", str(tmp_path / "page.md")]
-    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)[0]["messages"]
-    assert [(message["line"], message["ruleId"]) for message in told] == [(3, "terminology"), (5, "sentence-length")]
-    assert "use “Setpoints” instead" in told[0]["message"]
 
 
 FAILING = """---

@@ -79,8 +79,8 @@ def test_a_page_says_what_was_meant(page):
 
 
 BROKEN = {
-    "a figure at the beginning of a line": "A core takes\n<!-- figure a:b -->3<!-- end --> of `these` ([how](a.md)).",
-    "a figure within a line and at its beginning": "It takes <!-- a:b -->3<!-- end -->\n<!-- a:c -->4<!-- end --> of `those`.",
+    "a comment at the beginning of a line": "A core takes\n<!-- a:b -->3<!-- end --> of `these` ([how](a.md)).",
+    "a comment within a line and at its beginning": "It takes <!-- a:b -->3<!-- end -->\n<!-- a:c -->4<!-- end --> of `those`.",
     "text right after a block": "<!-- results of a -->\n**bold** text\n\n<div>and `this`\n</div>",
     "a link over a blank line": "see [the\n\npage](a.md)",
     "an open mark": "this is **not closed, and `neither is this",

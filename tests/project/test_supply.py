@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 import birthsim_env
+from birthsim.door import COMMANDS
 from tests.console import ROOT
 
 LOCKS = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "packaging" / "requirements").glob("*.txt")}
@@ -91,10 +92,14 @@ def test_a_workflow_runs_what_there_is_and_pins_its_actions(path):
     assert {name for names in re.findall(r"\bmake ([a-z-]+(?: [a-z-]+)*)", runs) for name in names.split()} <= targets
 
 
-def test_the_changelog_is_in_its_order():
+def test_the_changelog_is_in_its_order_and_names_commands_that_exist():
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    for version in text.split("\n## ")[1:]:
+    *later, first = text.split("\n## ")[1:]
+    for version in later:
         assert re.findall(r"^### (.*)$", version, re.MULTILINE) == ["Added", "Changed", "Fixed"]
+    assert first.startswith("0.1.0")
+    line = next(line for line in first.splitlines() if line.startswith("- `birthsim run`"))
+    assert {name.removeprefix("birthsim ") for name in re.findall(r"`([^`]+)`", line)} == {*COMMANDS} - {"study"}
 
 
 def test_the_headers_of_the_fmi_standard_are_unchanged():
