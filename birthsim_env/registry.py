@@ -30,7 +30,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "hand": ("birthsim_env.parts.hands",),
     "policy": ("agents.policy",),
     "reader": ("birthsim_env.tables",),
-    "export": ("agents.commands", "birthsim_build.commands", "birthsim_live.commands"),
+    "export": ("birthsim.exports",),
     "device": ("birthsim_env.parts", "birthsim_build.device"),
     "study": ("lab.studies",),
 }

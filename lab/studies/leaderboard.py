@@ -18,9 +18,9 @@ import numpy as np
 from agents.policy.seeds import shipped_names
 from baselines.about import RESIDUAL
 from baselines.bench.statistics import number, penalize_lost, summarize
-from baselines.commands.evaluate import Settings as Evaluated
-from baselines.commands.settings import Configured
 from baselines.registry import controller_names, make_controller, resolved
+from birthsim.command_line.settings import Configured
+from birthsim.commands.evaluate import Settings as Evaluated
 from birthsim_env import Parameters, normalized_score, reference_scores
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT
