@@ -31,7 +31,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "policy": ("agents.policy",),
     "reader": ("birthsim_env.tables",),
     "export": ("birthsim.exports",),
-    "device": ("birthsim_env.parts", "birthsim_build.device"),
+    "device": ("birthsim_env.episodes", "birthsim_build.device.episodes"),
     "study": ("lab.studies",),
 }
 """Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""
@@ -162,11 +162,12 @@ def entry(kind: str, name: str, more: str = "") -> Entry:
     ValueError
         Names what is unknown, what it is near to, and what there is; ``more`` adds what else is allowed.
     """
-    _enter(kind)
-    if name in _ENTRIES[kind]:
+    if not isinstance(name, str) or name not in _ENTRIES[kind]:
+        _enter(kind)  # only now: what is known already needs none of the rooms that are slow to import
+    if isinstance(name, str) and name in _ENTRIES[kind]:
         return _ENTRIES[kind][name]
     known = names(kind)
-    asked = near(name, known)
+    asked = near(name, known) if isinstance(name, str) else ""
     allowed = "a registered name" if asked else ", ".join(known)
     broken = "".join(f"; plugin {plugin!r} is left out: {why}" for plugin, why in _BROKEN.items())
     raise ValueError(f"{kind} = {shown(name)}{asked}; allowed: {allowed}{more}{broken}")
