@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from agents.training.trainer import train
 
 BELONGS_TO_BIRTHSIM = True
-"""Tells this package from others of its name: see ``birthsim_env.learned``."""
+"""Tells this package from others of its name: see ``birthsim.shadows``."""
 
 _PLACES = {
     "Policy": "policy.files",

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from baselines.controller import Controller
     from baselines.registry import make_controller
 
+BELONGS_TO_BIRTHSIM = True
+"""Tells this package from others of its name: see ``birthsim.shadows``."""
+
 _PLACES = {
     "AdmittanceController": "admittance.controller",
     "BacksteppingController": "backstepping.controller",

@@ -1,6 +1,6 @@
 """``python -m birthsim``: the command without its script."""
 
-from birthsim.door import main
+from birthsim.main import main
 
 if __name__ == "__main__":
     main()

@@ -4,16 +4,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baselines.commands.episodes import driven, record
-from baselines.commands.settings import RANDOMIZE
-from baselines.commands.worlds import check_environment, with_options
+from birthsim.command_line.settings import RANDOMIZE
+from birthsim.command_line.worlds import check_environment, with_options
+from birthsim.recorded import driven, record
 from birthsim_env.files import make_folder, whole_results
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
 if TYPE_CHECKING:
-    from birthsim.run import Settings
+    from birthsim.commands.run import Settings
 
 FIELDS = ("time", "position", "compliant_target", "tracking_error", "user_force")
 """What is kept of ``info``: s, m, m, m, N."""

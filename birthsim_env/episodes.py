@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import Setup, checked_actions
+from birthsim_env.assembly import Arguments, Setup, assemble, checked_actions
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.outcome import Outcome
@@ -13,6 +13,7 @@ from birthsim_env.parts.drawn.seeding import lane_seeds
 from birthsim_env.physics.compiled.lanes import PRESSURES, Y1, Y2, Array
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.values import shown
+from birthsim_env.registry import register
 from birthsim_env.restored import Declared, Kept
 from birthsim_env.state import State, give_state, take_state
 
@@ -249,3 +250,9 @@ def start_of(options: dict[str, Any] | None) -> Array | None:
     if position.shape != (2,) or not np.isfinite(position).all():
         raise ValueError(f"options['position'] = {shown(options['position'])}; allowed: (x, y), finite, in m")
     return position
+
+
+@register(device="cpu", about="this processor, all of its cores; arrays are NumPy's")
+def on_processor(lanes: int, scenario: str, arguments: Arguments) -> Episodes:
+    """Episodes of ``lanes`` lanes here."""
+    return Episodes(assemble(lanes, scenario, **arguments))

@@ -34,8 +34,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "hand": ("birthsim_env.parts.hands",),
     "policy": ("agents.policy.shipped",),
     "reader": ("birthsim_env.tables",),
-    "export": ("agents.commands", "birthsim_build.commands", "birthsim_live.commands"),
-    "device": ("birthsim_env.parts", "birthsim_build.device"),
+    "export": ("birthsim.exports",),
+    "device": ("birthsim_env.episodes", "birthsim_build.device.episodes"),
     "study": ("lab.studies",),
 }  # fmt: skip
 """Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""
@@ -199,8 +199,9 @@ def entry(kind: str, name: str, more: str = "") -> Entry:
     ValueError
         Names what is unknown, what it is near to, and what there is; ``more`` adds what else is allowed.
     """
-    _enter(kind)
-    found = _ENTRIES[kind].get(name)
+    if not isinstance(name, str) or name not in _ENTRIES[kind]:
+        _enter(kind)  # only now: what is known already needs none of the rooms that are slow to import
+    found = _ENTRIES[kind].get(name) if isinstance(name, str) else None
     if found is not None:
         for record in _RECORDS:
             record.add((kind, name))
@@ -210,7 +211,7 @@ def entry(kind: str, name: str, more: str = "") -> Entry:
             )
         return found
     known = names(kind)
-    asked = near(name, known)
+    asked = near(name, known) if isinstance(name, str) else ""
     allowed = "a registered name" if asked else ", ".join(known)
     broken = "".join(f"; plugin {plugin!r} is left out: {why}" for plugin, why in _BROKEN.items())
     raise ValueError(f"{kind} = {shown(name)}{asked}; allowed: {allowed}{more}{broken}")

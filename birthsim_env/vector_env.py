@@ -1,7 +1,5 @@
 """The native vector environment: N lanes of one scenario in one kernel call."""
 
-import copy
-from importlib import import_module
 from typing import Any, Unpack
 
 import numpy as np
@@ -9,7 +7,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import RENDER_MODES, Arguments, assemble, one_of, spelled_out
+from birthsim_env.assembly import RENDER_MODES, Arguments, one_of, spelled_out
 from birthsim_env.episodes import Episodes
 from birthsim_env.face import Face
 from birthsim_env.info import vector_info
@@ -17,6 +15,7 @@ from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import MOST_LANES
 from birthsim_env.physics.rig.values import checked_count, shown, whole_of
+from birthsim_env.registry import entry
 from birthsim_env.reward import REWARD_TERMS
 
 Observations = NDArray[np.float32]
@@ -48,7 +47,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        device: str | None = None,
+        device: str = "cpu",
         **arguments: Unpack[Arguments],
     ) -> None:
         num_envs = checked_count("num_envs", num_envs, 1, MOST_LANES)
@@ -62,13 +61,10 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         except (ValueError, TypeError):
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
-        if device is None:
-            episodes = Episodes(assemble(num_envs, scenario, **arguments))
-        else:
-            one_of("render_mode, with a device,", render_mode, (None,))
-            on_device = import_module("birthsim_build.device.episodes").DeviceEpisodes
-            # Each setup prepares the parts that it is given for its own lanes.
-            episodes = on_device(device, num_envs, lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
+        made = entry("device", device).made
+        if device != "cpu":
+            one_of(f"render_mode, with device = {device!r},", render_mode, (None,))
+        episodes: Episodes = made(num_envs, scenario, arguments)
         setup = episodes.setup
         self._show(episodes, autoreset_mode=self.autoreset_mode)
         self.num_envs = num_envs

@@ -46,7 +46,7 @@ def train(device: str, updates: int, lanes: int) -> list[float]:
         num_envs=lanes,
         randomize=True,
         autoreset_mode="SameStep",
-        device=None if device == "cpu" else device,
+        device=device,
     )
     worlds = Worlds(env)
     policy = make_policy(env.single_observation_space.shape[0], env.single_action_space.shape[0])

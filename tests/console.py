@@ -54,8 +54,8 @@ def call(command, monkeypatch, capsys, *arguments):
     """Exit status, what was printed and what was complained about, of a command within this process."""
     monkeypatch.setattr(sys, "argv", [*words(command), *map(str, arguments)])
     monkeypatch.setenv("NO_COLOR", "1")  # Python 3.14 colours what argparse says
-    monkeypatch.setattr("birthsim.door.answer_signals", lambda name: None)
-    main = importlib.import_module("birthsim.door").main
+    monkeypatch.setattr("birthsim.main.answer_signals", lambda name: None)
+    main = importlib.import_module("birthsim.main").main
     status = 0
     try:
         main()

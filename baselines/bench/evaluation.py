@@ -116,9 +116,9 @@ def evaluate_worlds(
 ) -> Evaluation:
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
     refuse_unknown(arguments, ("device", "max_episode_steps"), GIVEN)
-    if arguments.get("device") is not None:
+    if arguments.get("device", "cpu") != "cpu":
         said = "birthsim_build.device.evaluation.evaluate_on evaluates on a device"
-        raise ValueError(f"device = {shown(arguments['device'])}; allowed: None; {said}")  # type: ignore[typeddict-item]
+        raise ValueError(f"device = {shown(arguments['device'])}; allowed: 'cpu'; {said}")  # type: ignore[typeddict-item]
     result, law = Evaluation(name), controller_of(controller)
     spent: list[float] = []
     try:

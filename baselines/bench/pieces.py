@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate, merged
+from baselines.controller import Controller
 from baselines.registry import bare_name, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
@@ -88,8 +89,15 @@ def evaluate_piece(
     ``rig`` is what the controller believes, and where ``world`` has no ``parameters`` it is so.
     """
     law = make_controller(controller, Parameters.from_dict(rig), **options)
+    return piece_under(law, controller, rig, environment, world, seed, episodes)
+
+
+def piece_under(
+    law: Controller, name: str, rig: dict[str, Any], environment: str, world: dict[str, Any], seed: int, episodes: int
+) -> Result:
+    """``evaluate_piece`` under a controller that has been made."""
     world = {**world, "parameters": Parameters.from_dict(world.get("parameters", rig))}
-    found = evaluate(environment, law, controller, episodes, seed, progress=False, **world)
+    found = evaluate(environment, law, name, episodes, seed, progress=False, **world)
     if len(found.seeds) < episodes:
         raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a piece is complete or it is none
     trace = np.ascontiguousarray(np.concatenate(found.traces, axis=1), dtype="<f4")

@@ -1,6 +1,8 @@
 """Episodes whose lanes live on a device: they begin and advance there."""
 
+import copy
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
@@ -12,12 +14,13 @@ from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import SEVERAL
 from birthsim_build.device.machine import machine_named
 from birthsim_build.device.program import key_of
-from birthsim_env.assembly import Setup, checked_actions
+from birthsim_env.assembly import Arguments, Setup, assemble, checked_actions
 from birthsim_env.episodes import Episodes, start_of
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.loop.world import Start
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.registry import register
 
 
 class DeviceEpisodes(Episodes):
@@ -131,3 +134,12 @@ class DeviceEpisodes(Episodes):
 
     def set_state(self, *_: Any) -> NoReturn:
         raise NotImplementedError("set_state() of lanes on a device; allowed: without device=")
+
+
+def _on(device: str, lanes: int, scenario: str, arguments: Arguments) -> DeviceEpisodes:
+    # Each setup prepares the parts that it is given for its own lanes.
+    return DeviceEpisodes(device, lanes, lambda few: assemble(few, scenario, **copy.deepcopy(arguments)))
+
+
+register(device="cuda", about="an NVIDIA GPU; arrays are CuPy's", needs={"extra cuda"})(partial(_on, "cuda"))
+register(device="host", about="the code of a GPU's threads, on this processor")(partial(_on, "host"))

@@ -130,10 +130,11 @@ class Cuda:
 
 
 MACHINES: dict[str, Callable[[], Machine]] = {"host": Host, "cuda": Cuda}
+"""Device -> what its arrays are, and what runs there; ``birthsim_build.device.episodes`` registers them."""
 
 
 def machine_named(device: str) -> Machine:
     """The device of a name; ``ValueError`` for another name, and where something is missing."""
     if not isinstance(device, str) or device not in MACHINES:
-        raise ValueError(f"device = {shown(device)}; allowed: None, {', '.join(map(repr, MACHINES))}")
+        raise ValueError(f"device = {shown(device)}; allowed: {', '.join(map(repr, MACHINES))}")
     return MACHINES[device]()

@@ -1,28 +1,26 @@
 """Every command of ``birthsim`` with its options, from the settings that are read."""
 
-from baselines.commands.command import program
-from baselines.commands.start import load
-from birthsim.door import COMMANDS, GROUPS, overview
-from birthsim.export import FORMS
+from typing import Any
+
+from birthsim.command_line.command import program
+from birthsim.main import COMMANDS, load, overview
+from birthsim_env.registry import entries
 
 
 def commands() -> str:
     """A section for every command that parses options itself, and for every form of ``birthsim export``."""
-    places = {
-        f"birthsim {name}": COMMANDS[name] for group in GROUPS.values() for name in group if name not in ("export", "study")
-    }
-    sections = [_of(name, one.package, one.module, one.example) for name, one in places.items()]
-    forms: dict[tuple[str, str], list[str]] = {}
-    for form, (package, module, *_) in FORMS.items():
-        forms.setdefault((package, module), []).append(form)
-    for (package, module), names in forms.items():
-        example = f"export --to {names[0]} {FORMS[names[0]][-1]}"
-        sections.append(_of(f"birthsim export --to {', '.join(names)}", package, f"commands.{module}", example))
+    typed = {name: one for name, one in COMMANDS.items() if name not in ("export", "study")}
+    sections = [_of(name, load(name).Settings, f"{name} {one.example}") for name, one in typed.items()]
+    forms: dict[type[Any], list[str]] = {}
+    for form in entries("export"):
+        forms.setdefault(form.made.settings, []).append(form.name)
+    examples = {form.name: form.made.example for form in entries("export")}
+    for settings, names in forms.items():
+        sections.append(_of(f"export --to {', '.join(names)}", settings, f"export --to {names[0]} {examples[names[0]]}"))
     return "\n\n".join([f"```text\n{overview()}\n```", *sections])
 
 
-def _of(name: str, package: str, module: str, example: str) -> str:
+def _of(name: str, settings: type[Any], example: str) -> str:
     """A section, from the settings of a command."""
-    loaded = load("birthsim", package, module)
-    _, _, text = program(name, loaded.Settings).generate_docs(usage_name="birthsim").partition("\n")
-    return f"## `{name}`\n{text.rstrip()}\n\nExample: `birthsim {example}`"
+    _, _, text = program(f"birthsim {name}", settings).generate_docs(usage_name="birthsim").partition("\n")
+    return f"## `birthsim {name}`\n{text.rstrip()}\n\nExample: `birthsim {example.rstrip()}`"

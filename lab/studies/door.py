@@ -1,9 +1,10 @@
 """``birthsim study NAME``: what the project measures of itself and of its controllers; it comes with a clone."""
 
 import sys
+from importlib import import_module
 from typing import NamedTuple
 
-from baselines.commands.start import perform
+from birthsim.command_line.start import perform
 from birthsim_env.physics.rig.values import near, shown
 
 
@@ -89,4 +90,4 @@ def main(arguments: list[str]) -> None:
         raise SystemExit(2)
     sys.argv = ["", *rest]
     declared = name in OWN or STUDIES[name].declaration
-    perform(f"birthsim study {name}", "lab.studies", "shelf" if declared else STUDIES[name].module)
+    perform(f"birthsim study {name}", import_module(f"lab.studies.{'shelf' if declared else STUDIES[name].module}"))

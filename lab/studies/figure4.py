@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from baselines.commands.figure4 import figures_of, record_run
 from baselines.work.tasks import Result, Task
+from birthsim.commands.figure4 import figures_of, record_run
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.results import Content
 from lab.studies.study import Options, Study

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.statistics import number, penalize_lost, summarize
-from baselines.commands.evaluate import Settings as Evaluated
-from baselines.commands.settings import Configured
 from baselines.controller import RESIDUAL
 from baselines.registry import make_controller, resolved
+from birthsim.command_line.settings import Configured
+from birthsim.commands.evaluate import Settings as Evaluated
 from birthsim_env import Parameters, normalized_score, reference_scores
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT

@@ -17,7 +17,7 @@ RESULTS = ROOT / "lab" / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 ENGINE = (
-    "baselines/work/", "baselines/commands/", "baselines/about.py", "birthsim_env/files.py",
+    "baselines/work/", "birthsim/command_line/", "baselines/about.py", "birthsim_env/files.py",
     "birthsim_env/partials.py", "birthsim_env/physics/rig/json_reading.py", "birthsim_env/physics/rig/schema.py",
     "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "birthsim_env/drawing/",
     "baselines/figures/", "lab/studies/study.py", "lab/studies/results.py", "lab/studies/tables.py",

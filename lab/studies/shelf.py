@@ -12,8 +12,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import cast
 
-from baselines.commands.command import perform_with
-from baselines.commands.settings import Configured
+from birthsim.command_line.command import perform_with
+from birthsim.command_line.settings import Configured
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.values import shown

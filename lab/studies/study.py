@@ -12,8 +12,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from baselines.commands.settings import EPISODES, MANY, Processes, number, whole
 from baselines.work.tasks import Result, Task, run_tasks
+from birthsim.command_line.settings import EPISODES, MANY, Processes, number, whole
 from birthsim_env.files import own_folder, whole_results, write_text
 from birthsim_env.physics.compiled.sources import ROOT
 from lab.studies.results import RESULTS, Content, provenance, written

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from llvmlite.binding import llvm_version_info
 
-from baselines.commands.command import perform_with
+from birthsim.command_line.command import perform_with
+from birthsim.exports import loops as loops
 from birthsim_build.code import ptx
 from birthsim_build.code.compiler import LEAST_LLVM
 from birthsim_build.code.elf import contents_of
 from birthsim_build.code.targets import HOST
-from birthsim_build.commands import build as loops
 from birthsim_build.device.machine import machine_named
 
 BUILT = (

@@ -22,7 +22,7 @@ LACKS = [
 def test_without_what_it_needs_it_says_what_to_install(target, llvm, gone, said, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", llvm)
     monkeypatch.setattr(f"birthsim_build.code.{gone}", lambda *_: None)
-    monkeypatch.setattr("birthsim_build.commands.build.make_bundle", None)  # before anything is compiled
+    monkeypatch.setattr("birthsim.exports.loops.make_bundle", None)  # before anything is compiled
     status, _, complained = call("export", monkeypatch, capsys, "--to", target, "--out", tmp_path / "out")
     assert status == 2
     assert said in complained
@@ -32,7 +32,7 @@ def test_without_what_it_needs_it_says_what_to_install(target, llvm, gone, said,
 WITHOUT_POLICIES = """
 import sys
 sys.modules["safetensors"] = sys.modules["torch"] = None
-import birthsim_build.commands.build, birthsim_build.commands.fmu
+import birthsim.exports.loops, birthsim.exports.fmu
 from birthsim_build.loops import law_part
 from birthsim_env import Parameters
 print(len(law_part("pid", Parameters(), False).stages))

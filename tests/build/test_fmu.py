@@ -14,7 +14,7 @@ import pytest
 
 from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
-from birthsim_build.commands import fmu
+from birthsim.exports import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.description import exponents

@@ -9,10 +9,11 @@ import pytest
 from PIL import Image
 
 import birthsim_env
-from baselines.commands import animate, episodes
-from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from baselines.staged import driving
+from birthsim import recorded
+from birthsim.commands import animate
+from birthsim.commands.animate import SAMPLE, take
 from birthsim_env.drawing.pair import Pair
 from tests.console import call
 from tests.env.test_rendering import SCENE
@@ -89,7 +90,7 @@ def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch, ca
         asked.append((name, options))
         return make_controller(name, rig, **options)
 
-    monkeypatch.setattr(episodes, "make_controller", spied)
+    monkeypatch.setattr(recorded, "make_controller", spied)
     path = tmp_path / "pull.webp"
     options = ("--controller", "pid", "residual", "--begin", 0.0, "--end", 1.0, "--rate", 10, "--out", path)
     assert call("animate", monkeypatch, capsys, *options)[0] == 0

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from birthsim.doctor import extras
-from birthsim.door import COMMANDS
-from birthsim.export import FORMS
+from birthsim.commands.doctor import extras
+from birthsim.main import COMMANDS
+from birthsim_env.registry import names
 from tests.console import ROOT, assert_picture, call, run
 
-HELP = [(name,) for name in COMMANDS] + [("export", "--to", form) for form in FORMS]
+HELP = [(name,) for name in COMMANDS] + [("export", "--to", form) for form in names("export")]
 
 
 @pytest.mark.parametrize("words", HELP, ids=" ".join)
@@ -32,7 +32,7 @@ def test_help_fits_80_columns_and_ends_with_an_example(words, monkeypatch, capsy
 
 @pytest.mark.parametrize("words", [(), ("run", "--help"), ("evaluate", "--help"), ("train", "--help"), ("doctor", "--help")])
 def test_help_names_every_command_at_once_and_imports_nothing_heavy(words):
-    program = "import sys; from birthsim.door import main; main(); print(*sorted(sys.modules))"
+    program = "import sys; from birthsim.main import main; main(); print(*sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", program, *words], cwd=ROOT, capture_output=True, text=True, check=True)
     *printed, modules = done.stdout.splitlines()
     assert {"numpy", "numba", "gymnasium", "birthsim_env", "argparse"} & set(modules.split()) == set()
@@ -63,7 +63,7 @@ def test_an_episode_is_printed_and_drawn(monkeypatch, capsys, tmp_path):
 
 
 def test_doctor_names_what_is_missing(monkeypatch, capsys):
-    monkeypatch.setattr("birthsim.doctor.found", lambda name: None if name == "optuna" else "1.0")
+    monkeypatch.setattr("birthsim.commands.doctor.found", lambda name: None if name == "optuna" else "1.0")
     status, printed, _ = call("doctor", monkeypatch, capsys)
     assert status == 0
     extras = {line.split()[0]: line for line in printed.partition("extras\n")[2].splitlines()}
@@ -74,14 +74,14 @@ def test_doctor_names_what_is_missing(monkeypatch, capsys):
 
 def test_cupy_for_another_cuda_serves_as_the_extras_own(monkeypatch):
     here = {"cupy-cuda13x", "nvidia-cuda-nvcc", "llvmlite"}
-    monkeypatch.setattr("birthsim.doctor.found", lambda name: "1.0" if name in here else None)
+    monkeypatch.setattr("birthsim.commands.doctor.found", lambda name: "1.0" if name in here else None)
     assert extras()["cuda"] == []
     here.remove("cupy-cuda13x")
     assert extras()["cuda"] == ["cupy-cuda12x"]
 
 
 def test_studies_come_with_a_clone(monkeypatch, capsys):
-    monkeypatch.setattr("birthsim.study.find_spec", lambda name: None)
+    monkeypatch.setattr("birthsim.commands.study.find_spec", lambda name: None)
     status, printed, complained = call("study", monkeypatch, capsys, "status")
     assert (status, printed) == (2, "")
     assert "allowed: in a clone of the project" in complained

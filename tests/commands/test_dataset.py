@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.commands.dataset import LEVELS, made, recorded
+from birthsim.exports.dataset import LEVELS, made, recorded
 
 PROBE = "BirthSIM/Probe-v2"
 

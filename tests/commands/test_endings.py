@@ -13,17 +13,17 @@ from tests.console import PATIENCE, ROOT, call
 LOADING = """
 import sys, time
 sys.argv = ["birthsim", "tune"]
-from birthsim import door
+from birthsim import main as door
 def load(*_):
     print("loading tune", flush=True)
     time.sleep(600)
-door.perform = load
+door.load = load
 door.main()
 """
 
 LEAVING = """
 import atexit, signal, sys, time
-from baselines.commands.command import act
+from birthsim.command_line.command import act
 def leave():
     print("leaving", flush=True)
     time.sleep(600)
@@ -33,7 +33,7 @@ act("birthsim-x", lambda: signal.raise_signal(signal.SIGTERM))
 
 SWALLOWED = """
 import signal
-from baselines.commands.command import act
+from birthsim.command_line.command import act
 def swallow():
     try:
         signal.raise_signal(signal.SIGTERM)
@@ -47,7 +47,7 @@ import signal, sys
 from dataclasses import dataclass
 from typing import Annotated
 from cyclopts import Parameter
-from baselines.commands.command import perform_with
+from birthsim.command_line.command import perform_with
 @dataclass
 class Settings:
     lanes: Annotated[int, Parameter(converter=lambda *_: signal.raise_signal(signal.SIGTERM))]
@@ -77,10 +77,10 @@ def test_a_signal_ends_a_command_in_one_line(program, ending, said):
 
 
 BUSY = {
-    "evaluate --env BirthSIM/Probe-v2 --out out": "agents.commands.evaluate.run_tasks",
-    "animate --out out.webp": "baselines.commands.animate.take",
-    "identify log.csv --out rig.toml": "baselines.commands.identify.read_trial",
-    "tune --controller pid --out out": "baselines.commands.tune.costs",
+    "evaluate --env BirthSIM/Probe-v2 --out out": "birthsim.evaluation.run_tasks",
+    "animate --out out.webp": "birthsim.commands.animate.take",
+    "identify log.csv --out rig.toml": "birthsim.commands.identify.read_trial",
+    "tune --controller pid --out out": "birthsim.commands.tune.costs",
 }
 """A command, and what it is doing when Ctrl-C comes."""
 

@@ -8,10 +8,10 @@ import pytest
 from matplotlib import pyplot as plt
 
 from baselines.bench.evaluation import Evaluation, overview
-from baselines.commands import figure4 as figure4_command
-from baselines.commands.figure4 import FIELDS, figures_of, record_run
 from baselines.figures import runs as figures
 from baselines.figures.runs import error_over_time
+from birthsim.commands import figure4 as figure4_command
+from birthsim.commands.figure4 import FIELDS, figures_of, record_run
 from birthsim_env import Parameters
 from tests.console import assert_picture, call, strict
 

@@ -10,30 +10,27 @@ import tomli_w
 
 from agents.residual.settings import IMPEDANCES
 from agents.training.configuration import ALGORITHMS
-from baselines.commands import train
-from baselines.commands.command import program
-from baselines.commands.settings import RANDOMIZE, Configured, Kind, Randomize
-from baselines.commands.start import load
-from birthsim.door import COMMANDS
-from birthsim.export import FORMS
+from birthsim.command_line.command import program
+from birthsim.command_line.settings import RANDOMIZE, Configured, Kind, Randomize
+from birthsim.commands import train
+from birthsim.main import COMMANDS, load
 from birthsim_env.parts.drawn.randomization import RANDOMIZE as WORDS
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.registry import names
+from birthsim_env.registry import entries, names
 from tests.console import assert_says, call
 
+TYPED = [name for name in COMMANDS if name not in ("export", "study")]
 EXAMPLES = {
-    **{name: (one.package, one.module, one.example.split()[1:]) for name, one in COMMANDS.items()},
-    **{form: (one[0], f"commands.{one[1]}", ["--to", form, *one[3].split()]) for form, one in FORMS.items()},
+    **{name: (load(name).Settings, COMMANDS[name].example.split()) for name in TYPED},
+    **{one.name: (one.made.settings, ["--to", one.name, *one.made.example.split()]) for one in entries("export")},
 }
-"""Command, or form of an export -> package, module, arguments of its example."""
-TYPED = [name for name in EXAMPLES if name not in ("export", "study")]
+"""Command, or form of an export -> its settings, and the arguments of its example."""
 
 
-@pytest.mark.parametrize("name", TYPED)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_read_and_says_the_same_as_toml(name, tmp_path):
-    package, module, line = EXAMPLES[name]
-    settings = load("birthsim", package, module).Settings
+    settings, line = EXAMPLES[name]
     typed = program(name, settings)(line)
     assert isinstance(typed, settings)
     if not isinstance(typed, Configured):
@@ -67,7 +64,7 @@ def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_
 
 def test_what_is_typed_counts_more_than_toml(tmp_path):
     (tmp_path / "own.toml").write_text("seed = 4\nset = ['bandwidth=60']\nuser-force = 'sine'\nrandomize = 'all'\n")
-    read = program("birthsim run", load("birthsim", "birthsim", "run").Settings)
+    read = program("birthsim run", load("run").Settings)
     given = read(
         ["--config", str(tmp_path / "own.toml"), "--out", "x", "--seed", "5", *["--set", "a=1", "b=2", "--set", "c=3"]]
     )

@@ -2,10 +2,10 @@
 
 import pytest
 
-from agents.commands import explain
 from agents.policy.seeds import policy_folders
 from agents.reports import inspection
 from baselines.tables import aligned, markdown
+from birthsim.commands import explain
 
 
 def test_decimal_points_stand_below_each_other_and_words_to_the_left():

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.commands import tune
 from baselines.registry import make_controller
+from birthsim.commands import tune
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from tests.console import OWN, call, strict

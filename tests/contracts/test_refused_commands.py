@@ -178,7 +178,7 @@ def test_a_command_is_refused_in_one_line_and_leaves_nothing(line, tmp_path, mon
         need_linker()
     if line in GONE:
         monkeypatch.setitem(sys.modules, GONE[line][0], None)
-        for compiling in ("birthsim_live.commands.live.packed_page", "baselines.commands.tune.check_world"):
+        for compiling in ("birthsim.commands.live.packed_page", "birthsim.commands.tune.check_world"):
             monkeypatch.setattr(compiling, None)
     monkeypatch.chdir(tmp_path)
     for name, content in FILES.items():

@@ -77,7 +77,7 @@ def test_the_example_learns_in_a_hundred_updates() -> None:
 def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str, device: str) -> None:
     """Over the ends of episodes, where other rigs begin."""
     found = []
-    for place in (None, device):
+    for place in ("cpu", device):
         worlds = worlds_of(5, randomize=True, max_episode_steps=3, sensors=sensors, device=place)
         now, loss = worlds.reset(seed=1, options={"staggered": True}), 0.0
         actions = 0.1 * torch.sin(torch.arange(100.0).reshape(5, 5, 4))

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.commands import identify
 from baselines.identification import budget
 from baselines.identification.identified import REMEMBER
 from baselines.identification.identified import identify as identify_trial
 from baselines.identification.log_file import write_trial
 from baselines.identification.trial import Trial
+from birthsim.commands import identify
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from tests.console import call
 from tests.figures import caught

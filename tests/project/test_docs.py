@@ -12,7 +12,7 @@ import pytest
 
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
-from birthsim.door import COMMANDS
+from birthsim.main import COMMANDS
 from birthsim_env import Parameters
 from lab.studies.comparison import tables as comparison_tables
 from lab.studies.scores import tables as score_tables

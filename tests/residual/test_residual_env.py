@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents.residual import authority
-from agents.residual.corrected import ResidualActuation, CorrectedController
+from agents.residual.corrected import CorrectedController, ResidualActuation
 from agents.residual.settings import IMPEDANCES, LAWS, needs_force
 from baselines.registry import make_controller
 from birthsim_env import Parameters

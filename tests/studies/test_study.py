@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from baselines.commands.command import program
 from baselines.work.tasks import Task
+from birthsim.command_line.command import program
 from lab.studies import pools
 from lab.studies.study import Options, Study
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from agents.commands import evaluate as command
 from agents.policy.files import FORMAT, WEIGHTS, load_policy, policy_content, save_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_figures
@@ -22,6 +21,7 @@ from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import evaluate_piece
 from baselines.bench.statistics import crossed_interval, interquartile_mean
+from birthsim import evaluation as command
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
 from lab.studies.scores.study import _contestants

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from agents.commands import distill
 from agents.policy.files import WEIGHTS, load_policy
 from agents.policy.seeds import best_policy, policy_folders
 from agents.reports.learning_curves import learning_curves
@@ -15,7 +14,8 @@ from agents.training import student as module
 from agents.training.configuration import TrainingSettings
 from agents.training.student import Student, _learn
 from agents.training.trainer import train
-from baselines.commands.command import perform_with
+from birthsim.command_line.command import perform_with
+from birthsim.commands import distill
 
 
 def test_a_student_finds_from_the_past_what_it_is_not_told():

@@ -126,6 +126,6 @@ def test_the_stamp_follows_what_a_piece_imports_and_nothing_else():
     assert {"version", "sources", "python", "numpy", "numba", "scipy"} == set(stamp)
     sources = hashes("baselines.bench.pieces")
     assert {"birthsim_env/physics/plant.py", "baselines/admittance/law.py"} <= set(sources)
-    others = [name for name in sources if name.startswith(("baselines/figures", "baselines/commands"))]
+    others = [name for name in sources if name.startswith(("baselines/figures", "birthsim/"))]
     assert [name for name in others if not name.endswith("__init__.py")] == []
     assert code_stamp("json") != stamp

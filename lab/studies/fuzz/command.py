@@ -12,8 +12,8 @@ from typing import Annotated
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from baselines.commands.settings import MANY, Configured, Seed, whole
 from baselines.work.side_by_side import ONE_THREAD
+from birthsim.command_line.settings import MANY, Configured, Seed, whole
 from birthsim_env.files import write_json
 from lab.studies.alone import only_under
 from lab.studies.fuzz.harness import Case, Figures, fuzz, generator

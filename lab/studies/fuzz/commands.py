@@ -8,16 +8,19 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from baselines.commands.command import perform_with, program
+from birthsim.command_line.command import perform_with, program
 from lab.studies.fuzz.harness import Case, Kind
 from lab.studies.fuzz.mutations import Rng
 from lab.studies.shelf import declared
 
 MODULES = {
-    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify", "evaluate", "train")},
-    **{name: f"agents.commands.{name}" for name in ("export", "explain")},
-    "build": "birthsim_build.commands.build",
-    **{name: f"birthsim_live.commands.{name}" for name in ("live", "log")},
+    **{
+        name: f"birthsim.commands.{name}"
+        for name in ("figure4", "animate", "tune", "identify", "evaluate", "train", "explain", "live")
+    },
+    "build": "birthsim.exports.loops",
+    "export": "birthsim.exports.policy",
+    "log": "birthsim.exports.log",
 }
 ODD = (
     *("0", "-1", "1", "2", "1000000000", "9" * 320, "9" * 5000, "1e308", "nan", "inf", "-inf", "1.5", "0x10", "1_000", "", " "),

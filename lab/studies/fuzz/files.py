@@ -139,7 +139,6 @@ def _recording(valid: tuple[Any, Any, Any, bytes], rng: Rng, folder: Path, case:
 
 def loaded(_: Path) -> None:
     """What the readers of small files need, before memory is limited."""
-    import baselines.commands.tune
     import baselines.work.tasks
     from baselines.registry import make_controller
     from birthsim_env.parts.own_parts import trajectory_of
@@ -177,7 +176,7 @@ def _worked(seed: int) -> dict[str, Any]:
 
 
 def _gains(_: Any, rng: Rng, folder: Path, case: Case) -> None:
-    from baselines.commands.tune import start_of
+    from birthsim.commands.tune import start_of
 
     content = {"gains": {"bandwidth": 60.0, "friction_fraction": 0.5}, "cost": 1.0, "parts": {}}
     bounds = {"bandwidth": (10.0, 90.0), "friction_fraction": (0.0, 1.0)}

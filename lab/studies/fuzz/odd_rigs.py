@@ -20,8 +20,9 @@ import numpy as np
 import tomli_w
 from tqdm import tqdm
 
-from baselines.commands.settings import Configured, Seed, whole
-from baselines.commands.start import perform
+from birthsim.command_line.settings import Configured, Seed, whole
+from birthsim.command_line.start import perform
+from birthsim.main import load
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
@@ -79,7 +80,7 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
             place = out.with_suffix(".webp") if command == "animate" else out
             argv = [f"birthsim {command}", *lines[command], "--parameters", str(path), "--out", str(place)]
             with patch.object(sys, "argv", argv):
-                perform(f"birthsim {command}", "baselines", f"commands.{command}")
+                perform(f"birthsim {command}", load(command))
         return "works", ""
     except SystemExit as end:
         line = [text for text in re.split(r"[\r\n]+", complained.getvalue()) if "error:" in text or "Error" in text]

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from agents.commands.evaluate import evaluate_learned
 from agents.policy.files import WEIGHTS
+from agents.policy.pieces import evaluate_learned
 from agents.policy.seeds import as_table, policy_folders, seed_figures
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
@@ -190,7 +190,7 @@ def _side_by_side(content: Content, folder: Path) -> list[Path]:
     return draw_side_by_side(curves, folder, "from_scratch")
 
 
-SOURCES = ("agents.policy.controller", "agents.commands.evaluate", "lab.studies.learned.study")
+SOURCES = ("agents.policy.controller", "agents.policy.pieces", "lab.studies.learned.study")
 UNITS = {"settled_rms": "mm", "stiffness_error": "%", "noticed": "1", "energy": "mJ", "air": "l/min", "saturation": "%"}
 GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
 WORDS = {"policy": "shipped policies, each in its own worlds"}

@@ -25,8 +25,8 @@ from typing import Annotated, Any
 import pytest
 from cyclopts import Parameter
 
-from baselines.commands.command import perform_with
-from baselines.commands.settings import MANY, Configured, number, whole
+from birthsim.command_line.command import perform_with
+from birthsim.command_line.settings import MANY, Configured, number, whole
 from birthsim_env.files import write_json
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each

@@ -9,8 +9,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.commands.evaluate import evaluate_learned
 from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.pieces import evaluate_learned
 from agents.policy.seeds import policy_folders
 from agents.training.configuration import TARGETS
 from agents.training.validation import validate
@@ -132,7 +132,7 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__, "agents.commands.evaluate"),
+    (__name__, "agents.policy.pieces"),
     {
         "policy": "circle_honest_apg",
         "sensors": "honest",

@@ -15,9 +15,9 @@ from typing import Annotated, Any
 import numpy as np
 from tqdm import tqdm
 
-from baselines.commands.settings import Configured, Seed, whole
 from baselines.work.side_by_side import ONE_THREAD
 from baselines.work.tasks import code_stamp
+from birthsim.command_line.settings import Configured, Seed, whole
 from birthsim_env.files import make_folder, write_json, write_text
 from birthsim_env.physics.rig.json_reading import parse_json
 from lab.studies.alone import only_under

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash
-from baselines.commands.worlds import policy_of
 from baselines.work.tasks import Result, Task
+from birthsim.command_line.worlds import policy_of
 from birthsim_env.files import own_folder
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from lab.studies.sweeps.plan import Point, Sweep

@@ -75,10 +75,10 @@ def limits(clock: Clock) -> dict[str, float]:
     return {**found, "bytes/s to it": here.nbytes / sent}
 
 
-def stepping(clock: Clock, device: str | None, lanes: int, name: str, copied: bool = False, **arguments: Any) -> float:
+def stepping(clock: Clock, device: str, lanes: int, name: str, copied: bool = False, **arguments: Any) -> float:
     """Policy steps/s of all lanes."""
     env = gymnasium.make_vec(name, num_envs=lanes, randomize=True, device=device, **arguments)
-    xp = np if device is None else clock.arrays
+    xp = np if device == "cpu" else clock.arrays
     rng = np.random.default_rng(0)
     drawn = [rng.uniform(-0.3, 0.3, env.action_space.shape).astype(np.float32) for _ in range(4)]
     actions = drawn if copied else [xp.asarray(one) for one in drawn]
@@ -94,17 +94,17 @@ def stepping(clock: Clock, device: str | None, lanes: int, name: str, copied: bo
     return lanes / clock.seconds(step)
 
 
-def beginning(clock: Clock, device: str | None, lanes: int, name: str, **arguments: Any) -> float:
+def beginning(clock: Clock, device: str, lanes: int, name: str, **arguments: Any) -> float:
     """Episodes/s that begin, with what is drawn."""
     env = gymnasium.make_vec(name, num_envs=lanes, randomize=True, device=device, **arguments)
     env.reset(seed=0)
     return lanes / clock.seconds(env.reset)
 
 
-def going_back(clock: Clock, device: str | None, lanes: int, name: str, **arguments: Any) -> float:
+def going_back(clock: Clock, device: str, lanes: int, name: str, **arguments: Any) -> float:
     """Policy steps/s forward on a tape, and back."""
     env: Any = gymnasium.make_vec(name, num_envs=lanes, randomize=True, device=device, autoreset_mode="SameStep", **arguments)
-    recorder, xp = env.unwrapped.record(), np if device is None else clock.arrays
+    recorder, xp = env.unwrapped.record(), np if device == "cpu" else clock.arrays
     env.reset(seed=0, options={"staggered": True})
     ones, action = xp.ones(lanes), xp.zeros(env.action_space.shape, dtype=np.float32)
 
@@ -120,7 +120,7 @@ def rows(clock: Clock, device: str, most: int) -> list[tuple[str, ...]]:
     found: list[tuple[str, ...]] = [("loop", "lanes", "steps/s", "copied", "beginnings/s", "steps/s with gradients")]
     for label, (name, arguments) in LOOPS.items():
         for lanes in (None, *(1 << k for k in range(10, 21, 2) if 1 << k <= most)):
-            place, count = (device, lanes) if lanes else (None, NATIVE_LANES)
+            place, count = (device, lanes) if lanes else ("cpu", NATIVE_LANES)
             runs: list[Callable[..., float]] = [stepping, partial(stepping, copied=True), beginning, going_back]
             rates = [run(clock, place, count, name, **arguments) for run in (runs if count <= MOST_TAPES else runs[:3])]
             cells = [f"{one:,.0f}" for one in rates]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from baselines.commands.settings import Configured
+from birthsim.command_line.settings import Configured
 from lab.studies.verification import balances, mutants, reached, report, sources
 
 

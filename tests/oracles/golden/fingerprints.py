@@ -36,7 +36,7 @@ def rows() -> dict[str, tuple[str, str, str]]:
     return {f"{scenario}, {sensors}, {who}": (scenario, sensors, who) for scenario, sensors, who in dict.fromkeys(chosen)}
 
 
-def fingerprint(scenario: str, sensors: str, who: str, device: str | None = None) -> str:
+def fingerprint(scenario: str, sensors: str, who: str, device: str = "cpu") -> str:
     """SHA-256 of one run."""
     digest = hashlib.sha256()
     for arrays in _run(scenario, sensors, who, device):
@@ -50,7 +50,7 @@ def _here(array: Any) -> Any:
     return array.get() if hasattr(array, "get") else array
 
 
-def _run(scenario: str, sensors: str, who: str, device: str | None) -> Iterator[tuple[Any, ...]]:
+def _run(scenario: str, sensors: str, who: str, device: str) -> Iterator[tuple[Any, ...]]:
     shared = {"num_envs": LANES, "sensors": sensors, "randomize": True, "device": device}
     if who == "residual":
         policy = load_policy(best_policy(scenario))

@@ -1,0 +1,1 @@
+"""How commands are found, begun and ended, and the options that they share."""

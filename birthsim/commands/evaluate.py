@@ -1,0 +1,55 @@
+"""birthsim evaluate: controllers and policies over seeded episodes, with tables, JSON and figures."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from birthsim.command_line.settings import (
+    CONTROL,
+    EPISODES,
+    Controllers,
+    Env,
+    Parts,
+    Processes,
+    Randomize,
+    RigFile,
+    Seed,
+    Sensors,
+    Set,
+    whole,
+)
+
+
+@dataclass(kw_only=True)
+class Settings(Parts, Processes):
+    """Evaluate controllers: the same seeds, so the same worlds, for each of them.
+
+    Without --controller and --policy it is backstepping. With --policy the trained residual runs beside the controllers named,
+    or else beside the paper's and the one that it corrects. What the output folder holds of the same settings, rig and code is
+    kept, so that an interrupted run goes on.
+    """
+
+    env: Env = "BirthSIM/Circle-v1"
+    controller: Controllers = None
+    policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
+    """For the controller residual: a folder that birthsim train wrote, or the name of what is shipped, such as circle."""
+    set: Set = field(default_factory=list)
+    episodes: Annotated[int, whole(1, EPISODES)] = 32
+    """Episodes of each controller."""
+    seed: Seed = 0
+    """Seed of the first episode."""
+    sensors: Sensors = "ideal"
+    randomize: Randomize = "all"
+    """What differs between episodes; sensors: the scenario, and the figures of honest sensors."""
+    parameters: RigFile = None
+    out: Path
+    """Folder for evaluation.json, .md and .csv, and figures."""
+
+
+def main(settings: Settings) -> None:
+    """Run the episodes that the folder lacks; what that needs takes seconds to load."""
+    from birthsim.evaluation import run
+
+    run(settings)

@@ -1,0 +1,138 @@
+"""birthsim identify: a laboratory's own rig from a log, and the experiment that makes such a log."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from tqdm import tqdm
+
+from baselines.identification.experiment import DURATION, propose, read_plan
+from baselines.identification.identified import identify
+from baselines.identification.laboratory import run_plan
+from baselines.identification.log_columns import LogOptions
+from baselines.identification.log_file import read_trial, write_trial
+from baselines.identification.quantities import unmeasured
+from baselines.logs.writing import WRITERS
+from baselines.registry import make_controller
+from birthsim.command_line.settings import CONTROLLER, WORLD, Configured, Kind, RigFile, Seed, number, whole
+from birthsim_env.files import make_folder, whole_results, write_text
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+
+ONLY_WITH = {
+    **{"duration": "propose", "controller": "simulate", "sensors": "simulate"},
+    **dict.fromkeys(("report", "columns", "skip", "decimal_comma"), "log"),
+}
+"""Option -> the one of log, propose and simulate that it belongs to."""
+
+
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and write the rig as
+    TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.
+    """
+
+    log: Annotated[Path | None, Parameter(metavar="FILE")] = field(default=None, kw_only=False)
+    """.csv, .parquet, .mcap or .mat: time, openings, pressures, positions, forces."""
+    columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
+    """What columns of the log are called, such as force_x=Fz,force_y=none."""
+    skip: Annotated[int | None, whole(0)] = None
+    """Lines of the log before its heading, where it is not found by itself."""
+    decimal_comma: bool = False
+    """The log has decimal commas."""
+    propose: Annotated[Path | None, Parameter(metavar="PLAN")] = None
+    """Write an experiment as CSV: target, and openings to add."""
+    simulate: Annotated[Path | None, Parameter(metavar="PLAN")] = None
+    """Run an experiment on the simulator and write its log."""
+    out: Path | None = None
+    """The rig, .toml; with --simulate the log, .csv, .parquet or .mcap."""
+    report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
+    """Folder for report.md and figures of the residuals."""
+    duration: Annotated[float | None, number("S")] = None
+    """Duration of the proposed experiment, else 12 s."""
+    controller: Annotated[str | None, CONTROLLER] = None
+    """Controller of --simulate, else backstepping; for what a log tells it assumes the default rig."""
+    sensors: Annotated[Kind | None, Parameter(group=WORLD)] = None
+    """Sensors of --simulate, else lab."""
+    seed: Seed = 0
+    """Of what is random."""
+    parameters: RigFile = None
+
+
+def main(settings: Settings) -> None:
+    """Propose, simulate or identify."""
+    asked = [name for name in ("log", "propose", "simulate") if getattr(settings, name) is not None]
+    if len(asked) != 1:
+        raise ValueError(f"{' and '.join(asked) or 'nothing'} given; allowed: one of LOG, --propose PLAN, --simulate PLAN")
+    for name, needed in ONLY_WITH.items():
+        value = getattr(settings, name)
+        if value is not None and value is not False and asked != [needed]:
+            option = name.replace("_", "-")
+            raise ValueError(f"--{option} is given; allowed with {'LOG' if needed == 'log' else f'--{needed}'} only")
+    rig = load_parameters(settings.parameters)
+    if settings.log is not None:
+        _from_log(settings, settings.log, rig)
+    elif settings.propose is not None:
+        _propose(settings, settings.propose, rig)
+    elif settings.simulate is not None:
+        _simulate(settings, settings.simulate, rig)
+
+
+def _propose(settings: Settings, path: Path, rig: Parameters) -> None:
+    if settings.out is not None:
+        raise ValueError("--out is given; allowed with LOG or --simulate, --propose names its own file")
+    if path.suffix.lower() != ".csv":
+        raise ValueError(f"--propose {str(path)!r}; allowed: a file that ends in .csv")
+    plan = propose(rig, DURATION if settings.duration is None else settings.duration, settings.seed)
+    plan.write(path)
+    print(f"written to {path}: {len(plan.times)} rows of time, target and openings to add to a controller's")
+
+
+def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:
+    out = _out(settings, (".csv", *WRITERS))
+    plan = read_plan(path, rig)
+    law = make_controller(settings.controller or "backstepping", unmeasured(rig))
+    count = int((plan.times[-1] - plan.times[0]) / rig.electronics.control_period)
+    with _bar(count, "experiment", "periods") as tick:
+        trial = run_plan(plan, [rig], law, settings.sensors or "lab", settings.seed, tick)[0]
+    write_trial(trial, out, rig)
+    print(f"written to {out}: {len(trial.times)} rows, {trial.times[-1] - trial.times[0]:.4g} s")
+
+
+def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
+    out = _out(settings, (".toml",))
+    trial = read_trial(log, owner, LogOptions(settings.columns or "", settings.skip, settings.decimal_comma))
+    print("".join(f"{note}\n" for note in trial.notes), end="", flush=True)
+    folder = None if settings.report is None else make_folder(settings.report)
+    with _bar(None, "fit", "evaluations") as tick:
+        found = identify(trial, owner, settings.seed, tick=tick)
+    found.write(out, log.name)
+    print("\n".join(found.words()))
+    print(f"written to {out}: {sum(row.determined for row in found.rows)} of {len(found.rows)} parameters are from the log")
+    if folder is not None:
+        # pyplot takes half a second to load.
+        from baselines.figures.identification import intervals_figure, residuals_figure
+
+        with whole_results(folder) as place:
+            drawn = [*residuals_figure(found, place), *intervals_figure(found, place)]
+            pictures = [path.name for path in drawn if path.suffix == ".png"]
+            shown = [f"![{name}]({name})" for name in pictures]
+            text = [f"# {log.name}", "", *(f"- {line}" for line in (*found.notes, *found.words())), "", *shown]
+            write_text(place / "report.md", "\n".join(text) + "\n")
+        print(f"written to {folder}/: report.md, {', '.join(pictures)} (each picture as .svg too)")
+
+
+def _out(settings: Settings, suffixes: tuple[str, ...]) -> Path:
+    out = settings.out
+    if out is None or out.suffix.lower() not in suffixes or not out.resolve().parent.is_dir():
+        given = "is missing" if out is None else repr(str(out))
+        raise ValueError(f"--out {given}; allowed: a file that ends in {', '.join(suffixes)}, in a folder that exists")
+    return out
+
+
+@contextmanager
+def _bar(total: int | None, title: str, unit: str) -> Iterator[Callable[[], object]]:
+    with tqdm(total=total, desc=title, unit=f" {unit}", leave=False) as bar:
+        yield bar.update

@@ -1,0 +1,30 @@
+"""``birthsim run``: one episode of one controller, its error over time printed, its motion drawn."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from birthsim.command_line.settings import Controller, Env, Parts, Randomize, RigFile, Seed, Sensors, Set
+
+
+@dataclass(kw_only=True)
+class Settings(Parts):
+    """Run one episode, print its error second by second, draw its motion."""
+
+    env: Env = "BirthSIM/Circle-v1"
+    controller: Controller = "admittance"
+    set: Set = field(default_factory=list)
+    seed: Seed = 0
+    """Of the episode."""
+    sensors: Sensors = "ideal"
+    randomize: Randomize = "none"
+    """What the seed draws."""
+    parameters: RigFile = None
+    out: Path
+    """Folder for episode.png and .svg."""
+
+
+def main(settings: Settings) -> None:
+    """Load what an episode takes, seconds, and run it."""
+    from birthsim.episode import run
+
+    run(settings)

@@ -1,0 +1,54 @@
+"""birthsim train: policies by reinforcement learning or gradients, several seeds at once."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from birthsim.command_line.settings import PROCESSES, Env, Randomize, RigFile, Seed, Sensors, whole
+
+
+@dataclass(kw_only=True)
+class Settings:
+    """Train residual policies on top of a controller, by PPO, SAC, TQC, or gradients through the loop (apg).
+
+    Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
+    whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
+    the same policy.
+    """
+
+    config: Annotated[str, Parameter(metavar="NAME")] = "circle"
+    """A configuration of agents/configurations, such as circle_quick, or a TOML file."""
+    algorithm: Literal["ppo", "sac", "tqc", "apg"] | None = None
+    """How it learns."""
+    law: Annotated[str | None, Parameter(metavar="NAME")] = None
+    """Controller underneath, such as backstepping-force-first; none: the policy drives the valves by itself."""
+    impedance: Literal["fixed", "variable_kp", "variable"] | None = None
+    """What an action changes besides forces."""
+    authority: Annotated[float | None, Parameter(metavar="N")] = None
+    """Bound of the residual force."""
+    steps: Annotated[int | None, whole()] = None
+    """Policy steps of each seed."""
+    until: Annotated[float | None, Parameter(metavar="PERCENT")] = None
+    """Stop once the validation error is this far below that of the paper's controller."""
+    seed: Seed | None = None
+    """First seed, else the configuration's, 0."""
+    seeds: Annotated[int, whole()] = 1
+    """Number of seeds, one after the other from --seed on."""
+    jobs: Annotated[int, whole(), Parameter(group=PROCESSES)] = 1
+    """Seeds trained side by side."""
+    out: Path
+    """Folder; each seed has one in it with its policy, checkpoint, curve and events."""
+    env: Env | None = None
+    sensors: Sensors | None = None
+    randomize: Randomize | None = None
+    """What training varies."""
+    parameters: RigFile = None
+
+
+def main(settings: Settings) -> None:
+    """Train every seed and report; what that needs takes seconds to load."""
+    from birthsim.training import run
+
+    run(settings)
