@@ -7,8 +7,9 @@ import birthsim_env as birthsim_env
 
 if TYPE_CHECKING:
     from agents.policy.controller import ResidualController
-    from agents.policy.files import Policy, load_policy, save_policy
+    from agents.policy.files import Policy, save_policy
     from agents.policy.onnx_export import export_onnx
+    from agents.policy.seeds import load_policy
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
     from agents.training.sb3.adapter import SB3VecEnv
@@ -26,7 +27,7 @@ _PLACES = {
     "ShiftedReward": "training.sb3.shifted_reward",
     "TrainingSettings": "training.configuration",
     "export_onnx": "policy.onnx_export",
-    "load_policy": "policy.files",
+    "load_policy": "policy.seeds",
     "save_policy": "policy.files",
     "train": "training.trainer",
 }

@@ -1,65 +1,181 @@
-"""What birthsim train does: residual policies by reinforcement learning or by gradients, several seeds in one command."""
+"""Training of residual policies by reinforcement learning or by gradients, several seeds in one call or command."""
 
+import os
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from agents.policy.files import Policy
+from agents.policy.seeds import load_policy
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration, override
 from agents.training.time_split import shares
 from baselines.work.side_by_side import side_by_side
-from birthsim.command_line.settings import RANDOMIZE
+from birthsim.command_line.settings import JOBS_AT_MOST
 from birthsim.command_line.worlds import check_environment, check_world
-from birthsim.commands.train import Settings
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, write_json
-from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import checked_count, near, path_of, shown
 
 
-def run(settings: Settings) -> None:
-    """Train every seed and report."""
+@dataclass(frozen=True)
+class Plan:
+    """Trainings of several seeds that have been looked at, and how many of them run side by side."""
+
+    training: TrainingSettings
+    residual: ResidualSettings
+    rig: Parameters
+    seeds: tuple[int, ...]
+    jobs: int
+    out: Path
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a training reached.
+
+    Parameters
+    ----------
+    folder : Path
+        Where each seed has a folder ``seed_N`` with its policy, checkpoint, curve and events.
+    reached : dict
+        Seed -> what its ``training.json`` holds: ``policy``, ``law`` and ``paper`` with ``pooled_mm``, the settled RMS error
+        over all validation episodes, ``tail_mm``, its 95th percentile, and ``lost``, the number of lost episodes; ``curve``,
+        a list with the same of every validation, ``steps`` and ``seconds``; ``settings``.
+
+    Examples
+    --------
+    ``train`` returns one.
+
+    >>> import birthsim, pathlib
+    >>> trained = birthsim.Trained(pathlib.Path("out"), {0: {"policy": {"pooled_mm": 1.2}}})
+    >>> trained.reached[0]["policy"]["pooled_mm"]
+    1.2
+    """
+
+    folder: Path
+    reached: dict[int, dict[str, Any]]
+
+    @property
+    def policy(self) -> Policy:
+        """The policy of the seed that did best in validation."""
+        return load_policy(self.folder)
+
+
+def train(
+    config: str | os.PathLike[str] = "circle",
+    *,
+    out: str | os.PathLike[str],
+    seed: int | None = None,
+    seeds: int = 1,
+    jobs: int = 1,
+    parameters: Any = None,
+    **changes: Any,
+) -> Trained:
+    """Train residual policies on top of a controller, as ``birthsim train`` does.
+
+    Parameters
+    ----------
+    config : str or path
+        A configuration that comes with the package, such as ``"circle"`` or ``"circle_quick"``, or a TOML file with tables
+        ``[training]`` and ``[residual]``.
+    out : str or path
+        Folder; each seed has one in it. Where it holds a training of the same settings that was interrupted, that goes on, and
+        ends with the same policy.
+    seed : int, optional
+        First seed, else the configuration's.
+    seeds : int
+        Number of seeds, one after the other from ``seed`` on.
+    jobs : int
+        Seeds that are trained side by side, each in a process of its own.
+    parameters : Parameters, path, mapping or None
+        The rig, as environments take it.
+    **changes
+        Fields of ``agents.TrainingSettings`` and ``agents.ResidualSettings`` instead of what the configuration says, such as
+        ``environment``, ``algorithm`` (``"ppo"``, ``"sac"``, ``"tqc"`` or ``"apg"``), ``steps`` (policy steps), ``law``,
+        ``authority`` (N).
+
+    Returns
+    -------
+    Trained
+        The folder, what each seed reached, and the best policy.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed; also where the extra ``agents`` is missing, and where ``out`` holds
+        a training with other settings.
+
+    Notes
+    -----
+    A policy corrects its controller by forces of at most ``authority``, and is kept whenever it improves on validation worlds;
+    docs/learning.md says how, and what came of it.
+
+    Examples
+    --------
+    A training that is much too short to learn anything:
+
+    >>> import birthsim, tempfile
+    >>> tiny = {"lanes": 2, "rollout": 8, "batch": 8, "epochs": 1, "hidden": (8,), "validation_lanes": 2, "validations": 1}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     probe = {"environment": "BirthSIM/ProbeResidual-v2", "policy_period": 0.1}
+    ...     trained = birthsim.train("circle", out=folder, steps=16, **probe, **tiny)
+    ...     trained.policy.environment
+    'BirthSIM/ProbeResidual-v2'
+    """
+    folder = path_of(out)
+    if folder is None:
+        raise ValueError(f"out = {shown(out)}; allowed: the path of a folder")
+    return carry_out(plan(config, Path(folder), seed, seeds, jobs, parameters, changes))
+
+
+def plan(
+    config: str | os.PathLike[str],
+    out: Path,
+    seed: int | None,
+    seeds: int,
+    jobs: int,
+    parameters: Any,
+    changes: dict[str, Any],
+) -> Plan:
+    """Trainings that can begin; ``ValueError`` names what cannot be."""
     missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
     if missing:
         raise ValueError(f"no {' and no '.join(missing)}; training needs the extra: {installation('agents')}")
-    training, residual = _settings(settings)
-    rig = load_parameters(settings.parameters)
+    seeds, jobs = checked_count("seeds", seeds, 1, 10**6), checked_count("jobs", jobs, 1, JOBS_AT_MOST)
+    training, residual = load_configuration(config)
+    own = [field.name for field in fields(residual)]
+    known = [*(field.name for field in fields(training)), *own]
+    for name, value in changes.items():
+        if name not in known:
+            raise ValueError(f"{name} = {shown(value)} is unknown{near(name, known)}; allowed: {', '.join(known)}")
+    residual = override(residual, **{name: value for name, value in changes.items() if name in own})
+    given = {} if seed is None else {"seed": seed}
+    training = override(training, **given, **{name: value for name, value in changes.items() if name not in own})
+    rig = load_parameters(parameters)
     for name, hand in training.worlds():
         check_environment(name, residual=True)
         check_world(name, parameters=rig, randomize=training.randomize, sensors=training.sensors, **hand)
-    first = training.seed if settings.seed is None else settings.seed
-    seeds = range(first, first + settings.seeds)
-    make_folder(settings.out)
+    return Plan(training, residual, rig, tuple(range(training.seed, training.seed + seeds)), jobs, make_folder(out))
+
+
+def carry_out(plan: Plan) -> Trained:
+    """Train every seed."""
     work = [
-        (replace(training, seed=seed), residual, settings.out / f"seed_{seed}", rig, k % settings.jobs)
-        for k, seed in enumerate(seeds)
+        (replace(plan.training, seed=seed), plan.residual, plan.out / f"seed_{seed}", plan.rig, k % plan.jobs)
+        for k, seed in enumerate(plan.seeds)
     ]
-    print(described(rig, training.randomize, training.sensors))
     results: dict[int, dict[str, Any]] = {}
     try:
-        side_by_side(_one, work, settings.jobs, results.__setitem__)
+        side_by_side(_one, work, plan.jobs, results.__setitem__)
     except BaseException:
-        if settings.jobs > 1:
+        if plan.jobs > 1:
             print(file=sys.stderr)  # the bar of a process that has been ended has no end of line
         raise
-    _report(training, residual, list(seeds), [results[k] for k in range(len(work))])
-    print(f"written to {settings.out}/")
-
-
-def _settings(settings: Settings) -> tuple[TrainingSettings, ResidualSettings]:
-    """The configuration, with what the options say instead."""
-    training, residual = load_configuration(settings.config)
-    said = {
-        "environment": settings.env, "algorithm": settings.algorithm, "steps": settings.steps, "sensors": settings.sensors,
-        "until": settings.until, "randomize": None if settings.randomize is None else RANDOMIZE[settings.randomize],
-    }  # fmt: skip
-    allowed = {"law": settings.law, "impedance": settings.impedance, "authority": settings.authority}
-    return (
-        override(training, **{name: value for name, value in said.items() if value is not None}),
-        override(residual, **{name: value for name, value in allowed.items() if value is not None}),
-    )
+    return Trained(plan.out, {seed: results[k] for k, seed in enumerate(plan.seeds)})
 
 
 def _one(
@@ -73,8 +189,10 @@ def _one(
     return reached
 
 
-def _report(training: TrainingSettings, residual: ResidualSettings, seeds: list[int], results: list[dict[str, Any]]) -> None:
-    law, paper = results[0]["law"], results[0]["paper"]
+def report(plan: Plan, trained: Trained) -> None:
+    """Print what was reached, beside the controller below and the paper's."""
+    training, residual, results = plan.training, plan.residual, trained.reached
+    law, paper = (results[plan.seeds[0]][name] for name in ("law", "paper"))
     print(
         f"\n{training.environment}, {training.validation_lanes} validation episodes, of which {law['infeasible']} ask for more"
     )
@@ -84,13 +202,13 @@ def _report(training: TrainingSettings, residual: ResidualSettings, seeds: list[
     for name, figures in (
         *((("the paper's law", paper),) if paper else ()),
         *(((residual.law, law),) if not paper or residual.law != LAWS[0] else ()),
-        *((f"seed {seed}", result["policy"]) for seed, result in zip(seeds, results, strict=True)),
+        *((f"seed {seed}", result["policy"]) for seed, result in results.items()),
     ):
         better = "" if figures in (law, paper) else f"  {100 * (1 - figures['pooled_mm'] / measure['pooled_mm']):3.0f} % below"
         print(f"{name:26}{figures['pooled_mm']:7.2f} mm{figures['tail_mm']:7.2f} mm{figures['lost']:8d}{better}")
-    last = [result["curve"][-1] for result in results]
+    last = [result["curve"][-1] for result in results.values()]
     print(", ".join(f"{point['steps']:,}" for point in last), f"of {training.steps:,} steps;", end=" ")
     seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
     print(f"{seconds} s per seed with validation; the time of training alone:")
-    for seed, result in zip(seeds, results, strict=True):
+    for seed, result in results.items():
         print(f"seed {seed}: {shares(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")

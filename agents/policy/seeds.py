@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, Policy
+from agents.policy.files import load_policy as read_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, jsonable, penalize_lost, quantile
@@ -66,9 +67,47 @@ def best_policy(path: str | os.PathLike[str]) -> Path:
     return min(errors, key=lambda folder: errors[folder])
 
 
+def load_policy(policy: str | os.PathLike[str]) -> Policy:
+    """Load a trained policy.
+
+    Parameters
+    ----------
+    policy : str or path
+        The name of one that comes with the package, such as ``"circle"``, or a folder that ``train`` wrote. Of several seeds
+        it is the one that did best in validation.
+
+    Returns
+    -------
+    Policy
+        The network, the environment that it was trained on, and what it may do.
+
+    Raises
+    ------
+    ValueError
+        Says what is missing, damaged or foreign.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> policy = birthsim.load_policy("circle")
+    >>> policy.environment, policy.settings.law
+    ('BirthSIM/CircleResidual-v1', 'backstepping')
+
+    It acts in an environment with its controller inside:
+
+    >>> worlds = birthsim.make_vec(policy.environment, num_envs=2, **policy.settings.to_dict())
+    >>> act = policy.network.acting()
+    >>> observations, infos = worlds.reset(seed=0)
+    >>> act(observations).shape == worlds.action_space.shape
+    True
+    >>> worlds.close()
+    """
+    return read_policy(best_policy(policy))
+
+
 def _validation_error(folder: Path) -> float | None:
     """Pooled error of a policy in validation, mm; None where that says nothing."""
-    training = load_policy(folder).training
+    training = read_policy(folder).training
     problem = fault(training, {"reached": {"pooled_mm": (float, None)}}, "training")
     error = None if problem else training["reached"]["pooled_mm"]
     if not problem and error is not None and not 0 <= error < float("inf"):

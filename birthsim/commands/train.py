@@ -6,7 +6,10 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from birthsim.command_line.settings import PROCESSES, Env, Randomize, RigFile, Seed, Sensors, whole
+from birthsim.command_line.settings import PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
+
+CHANGES = ("algorithm", "steps", "sensors", "until", "law", "impedance", "authority")
+"""Options that are called as the settings of a training that they change."""
 
 
 @dataclass(kw_only=True)
@@ -49,6 +52,16 @@ class Settings:
 
 def main(settings: Settings) -> None:
     """Train every seed and report; what that needs takes seconds to load."""
-    from birthsim.training import run
+    from birthsim.training import carry_out, plan, report
+    from birthsim_env.parts.drawn.randomization import described
 
-    run(settings)
+    said = {
+        "environment": settings.env,
+        "randomize": None if settings.randomize is None else RANDOMIZE[settings.randomize],
+        **{name: getattr(settings, name) for name in CHANGES},
+    }
+    changes = {name: value for name, value in said.items() if value is not None}
+    own = plan(settings.config, settings.out, settings.seed, settings.seeds, settings.jobs, settings.parameters, changes)
+    print(described(own.rig, own.training.randomize, own.training.sensors))
+    report(own, carry_out(own))
+    print(f"written to {settings.out}/")
