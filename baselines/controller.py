@@ -23,11 +23,28 @@ BEYOND = 1000.0
 
 
 class Controller(Protocol):
-    """A control law, called once per control period.
+    """What every controller is: an object with these two methods, called once per control period.
 
-    ``command`` takes what the sensors say and what is asked for, and returns spool openings in [-1, 1] of the valves of
-    chambers P1, N1, P2, N2: (4, N) for signals over N lanes, (4,) for one rig. ``reset`` forgets the past, of all lanes or
-    of those where the mask (N,) is True.
+    Notes
+    -----
+    ``command(measurement, reference)`` takes what the sensors say and what is asked for, a ``Measurement`` and a ``Reference``,
+    and returns spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N) for signals over N lanes, (4,) for
+    one rig. ``reset(lanes=None)`` forgets the past, of all lanes or of those where the mask (N,) is True. A controller never
+    gets an environment.
+
+    Examples
+    --------
+    A controller of your own needs no base class:
+
+    >>> import numpy as np, birthsim
+    >>> class Shut:
+    ...     def command(self, measurement, reference):
+    ...         return np.zeros_like(measurement.pressures)
+    ...     def reset(self, lanes=None):
+    ...         pass
+    >>> found = birthsim.evaluate("BirthSIM/Probe-v2", Shut(), episodes=2, duration=1.0, progress=False)
+    >>> len(found.metrics["error_rms_x"])
+    2
     """
 
     def command(self, measurement: Measurement, reference: Reference) -> Array: ...

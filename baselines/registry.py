@@ -147,11 +147,37 @@ def known_options(name: str) -> list[str] | None:
 
 
 def make_controller(name: str | os.PathLike[str], parameters: Parameters | None = None, **options: Any) -> Controller:
-    """The controller ``name``, or what a user's own file has, given as ``path/to/file.py:Name``.
+    """Make a controller by its name.
 
-    A name may carry options, ``pid[bandwidth=60]``, or a policy, ``residual:circle``. ``limited:`` before it puts the law
-    behind the limits of ``PortLimiter``. ``parameters`` are what environments take too. ``options`` are those of the
-    controller, as its name carries them. Raises ``ValueError`` naming what is unknown and what there is.
+    Parameters
+    ----------
+    name : str or path
+        One of ``birthsim.controllers()``, with options as in ``"pid[bandwidth=60]"``, or a policy's, ``"residual:circle"``;
+        or what a file of your own has, ``"path/to/file.py:Name"``. ``limited:`` before it puts the controller behind the
+        limits of ``PortLimiter``.
+    parameters : Parameters, path, mapping or None
+        What the controller assumes of the rig; None stands for the defaults.
+    **options
+        Of the controller, as its name carries them.
+
+    Returns
+    -------
+    Controller
+        An object with ``command(measurement, reference)`` and ``reset(lanes)``.
+
+    Raises
+    ------
+    ValueError
+        Names what is unknown and what there is, or the option, its value and what is allowed.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> controller = birthsim.make_controller("pid", bandwidth=60.0)
+    >>> env = birthsim.make("BirthSIM/Circle-v1", policy_period=0.001)
+    >>> observation, info = env.reset(seed=0)
+    >>> action = controller.command(env.unwrapped.measurement, env.unwrapped.reference)
+    >>> observation, reward, terminated, truncated, info = env.step(action)
     """
     if not isinstance(name, (str, os.PathLike)):
         raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(names('controller'))}{OWN_FILE}")

@@ -105,8 +105,27 @@ def feedforward_rows(
 
 @dataclass(frozen=True)
 class ControllerStage:
-    """A stage of a law: its function, its constants (C,), the memory (M,) of a lane that starts, and whether it reads an
-    acceleration."""
+    """A stage of a controller: compiled code that runs over a block of lanes once per control period.
+
+    Parameters
+    ----------
+    function : callable
+        A kernel, ``birthsim_env.physics.compiled.compilation.kernel`` above a function (world, seen, memory, constants,
+        tables, lane, n).
+    constants : array, (C,)
+        What it reads and all lanes share.
+    fresh : array, (M,)
+        The memory of a lane that starts; every lane has its own, (M, N).
+    reads_acceleration : bool
+        Whether it needs ``Measurement.acceleration``.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> stages = birthsim.make_controller("pid").controller_stages(sampled=False)
+    >>> all(isinstance(one, birthsim.ControllerStage) for one in stages)
+    True
+    """
 
     function: Callable[..., int]
     constants: Array
@@ -115,12 +134,34 @@ class ControllerStage:
 
 
 class StagedController:
-    """A controller that is compiled stages.
+    """A controller that is compiled stages, and so runs in every target: Gymnasium, browser, C, FMU, GPU.
 
-    It derives from this class, gives ``controller_stages`` and says in ``explain`` what it refuses.
+    Parameters
+    ----------
+    parameters : Parameters, path, mapping or None
+        What the controller assumes of the rig; None stands for the defaults.
 
-    ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
-    A sample that is not finite is replaced by the last good one (``birthsim_env.loop.guard``); ``missed`` counts the periods.
+    Raises
+    ------
+    ValueError
+        Names the parameter, its value and what is allowed.
+
+    Notes
+    -----
+    A controller derives from this class, returns its stages from ``controller_stages(sampled)`` and says in ``explain`` what
+    it refuses; docs/controllers.md shows one. A sample that is not finite is replaced by the last good one; ``missed`` counts
+    the periods, and ``protect`` chooses what happens then.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> controller = birthsim.make_controller("pid")
+    >>> isinstance(controller, birthsim.StagedController)
+    True
+    >>> env = birthsim.make("BirthSIM/Circle-v1", policy_period=0.001)
+    >>> observation, info = env.reset(seed=0)
+    >>> controller.command(env.unwrapped.measurement, env.unwrapped.reference).shape
+    (4,)
     """
 
     COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = COMMAND_OPTIONS

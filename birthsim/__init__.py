@@ -4,7 +4,7 @@
 
     env = birthsim.make("BirthSIM/Circle-v1", sensors="lab", randomize=True)
 
-What is below is all that most programs need. A name is imported when it is first used, so that ``import birthsim`` takes no time.
+What is below is all that most programs need. A name is imported when it is first used, so that ``import birthsim`` is quick.
 The packages behind it, ``birthsim_env``, ``baselines``, ``agents`` and ``birthsim_build``, may be imported by themselves.
 """
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from baselines.controller import Controller as Controller
     from baselines.identification.identified import Identified as Identified
     from baselines.registry import make_controller as make_controller
-    from baselines.staged import LawStage as LawStage
+    from baselines.staged import ControllerStage as ControllerStage
     from baselines.staged import StagedController as StagedController
     from birthsim.environments import environments as environments
     from birthsim.environments import make as make
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from birthsim.exporting import export as export
     from birthsim.identification import identify as identify
     from birthsim.names import controllers as controllers
-    from birthsim.shipped import policies as policies
+    from birthsim.names import policies as policies
     from birthsim.training import Trained as Trained
     from birthsim.training import train as train
     from birthsim_env.gradients.linear.linearize import balanced_pressures as balanced_pressures
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from birthsim_env.parts.hands.user_forces import ForceProfile as ForceProfile
     from birthsim_env.parts.hands.user_forces import UserForce as UserForce
     from birthsim_env.parts.references import Circle as Circle
-    from birthsim_env.parts.references import Hold as Hold
+    from birthsim_env.parts.references import FixedTarget as FixedTarget
     from birthsim_env.parts.references import Path as Path
     from birthsim_env.parts.references import Trajectory as Trajectory
     from birthsim_env.parts.stiffness_schedules import StiffnessSchedule as StiffnessSchedule
@@ -53,11 +53,11 @@ if TYPE_CHECKING:
 _PLACES = {
     "Circle": "birthsim_env.parts.references",
     "Controller": "baselines.controller",
+    "ControllerStage": "baselines.staged",
     "Evaluation": "baselines.bench.evaluation",
+    "FixedTarget": "birthsim_env.parts.references",
     "ForceProfile": "birthsim_env.parts.hands.user_forces",
-    "Hold": "birthsim_env.parts.references",
     "Identified": "baselines.identification.identified",
-    "LawStage": "baselines.staged",
     "LinearModel": "birthsim_env.gradients.linear.model",
     "Measurement": "birthsim_env.loop.signals",
     "Parameters": "birthsim_env.physics.rig.parameters",
@@ -84,14 +84,14 @@ _PLACES = {
     "make_controller": "baselines.registry",
     "make_vec": "birthsim.environments",
     "normalized_score": "birthsim_env.scores",
-    "policies": "birthsim.shipped",
+    "policies": "birthsim.names",
     "reference_scores": "birthsim_env.scores",
     "register": "birthsim_env.registry",
     "train": "birthsim.training",
 }
 """Public name -> where it lives; it is imported when it is first used."""
 
-LEARNED = ("Policy", "Trained", "load_policy", "policies", "train")
+LEARNED = ("Policy", "Trained", "load_policy", "train")
 """What needs the extra ``agents``."""
 
 __all__ = sorted(_PLACES)

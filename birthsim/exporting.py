@@ -34,9 +34,9 @@ def export(form: str, /, **options: Any) -> Path | None:
     >>> import birthsim, pathlib, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = birthsim.export("fmu", out=pathlib.Path(folder) / "rig.fmu")
-    ...     path.stat().st_size > 100_000
+    ...     path.name
     written to ...rig.fmu: ...
-    True
+    'rig.fmu'
     """
     chosen = entry("export", form).made
     known = [name for name in vars(chosen.settings)["__dataclass_fields__"] if name not in ("to", "config")]

@@ -1,6 +1,6 @@
-"""Controllers by their names."""
+"""What there is to choose from, by name."""
 
-from baselines.registry import controller_names
+from birthsim_env.registry import names
 
 
 def controllers() -> list[str]:
@@ -12,10 +12,31 @@ def controllers() -> list[str]:
         Names that ``make_controller``, ``evaluate`` and the commands take. A name may carry options,
         ``"pid[bandwidth=60]"``; a controller of your own is named by its file, ``"path/to/file.py:Class"``.
 
+    See Also
+    --------
+    register : adds a controller to the list.
+
     Examples
     --------
     >>> import birthsim
     >>> {"backstepping", "admittance", "pid"} <= set(birthsim.controllers())
     True
     """
-    return controller_names()
+    return names("controller")
+
+
+def policies() -> list[str]:
+    """List the trained policies that come with the package.
+
+    Returns
+    -------
+    list of str
+        Names that ``load_policy`` takes, and ``"residual:NAME"`` as a controller's name.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> "circle" in birthsim.policies()
+    True
+    """
+    return names("policy")

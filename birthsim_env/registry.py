@@ -105,12 +105,53 @@ def register(
     order: int = LAST,
     **named: str,
 ) -> Callable[[T], T]:
-    """A decorator that registers what it stands above, under ``kind="name"``; it returns it as it is.
+    """Decorate what a user may ask for by a name: a controller, a sensor model, a scenario, a hand and others.
+
+    Parameters
+    ----------
+    about : str
+        What it is, in a sentence.
+    needs : iterable of str
+        What it cannot do without: ``"force sensor"``, ``"acceleration sensor"``, or an extra, as ``"extra agents"``.
+    listed : bool
+        Whether lists show it that do not show everything: scores, the page, the comparison.
+    options : mapping, optional
+        What it is called with, where it is another entry with options.
+    deprecated : str
+        What takes its place; "" where it stays.
+    order : int
+        Where lists show it; equal ones stand in alphabetical order.
+    **named : str
+        One kind and the name, ``controller="adrc"``; a kind is one of ``ROOMS``.
+
+    Returns
+    -------
+    callable
+        A decorator, which returns what it stands above as it is.
 
     Raises
     ------
     ValueError
-        For no kind of ``ROOMS``, more than one, or a name that another module has taken.
+        For no kind of ``ROOMS``, more than one, or a name that is taken.
+
+    Notes
+    -----
+    The module must be imported before the name is used. Another distribution names it in an entry point of the group
+    ``birthsim.plugins``.
+
+    Examples
+    --------
+    >>> import numpy as np, birthsim
+    >>> @birthsim.register(controller="half-open", about="Valves that stay half open.", listed=False)
+    ... class HalfOpen:
+    ...     def __init__(self, parameters):
+    ...         self.parameters = parameters
+    ...     def command(self, measurement, reference):
+    ...         return np.full((4, *measurement.time.shape), 0.5)
+    ...     def reset(self, lanes=None):
+    ...         pass
+    >>> type(birthsim.make_controller("half-open")).__name__
+    'HalfOpen'
     """
     if len(named) != 1 or not set(named) <= set(ROOMS):
         raise ValueError(f"register({', '.join(named)}); allowed: one of {', '.join(ROOMS)}")

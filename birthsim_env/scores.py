@@ -37,14 +37,39 @@ def _scores() -> dict[str, Any]:
 
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
-    """What is known of an environment: role (``ROLES``) -> figures.
+    """What controllers reach in an environment, as it was measured.
 
-    The figures are the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over
-    episodes of the settled error; None where most are lost), and the fractions ``lost`` and ``success``.
+    Parameters
+    ----------
+    environment : str
+        An id; one with a controller inside has the scores of the one without.
+    sensors : str
+        ``"ideal"`` or ``"lab"``.
+    randomize : bool
+        Whether rig and scenario are drawn; all other arguments of the environment are the defaults.
 
-    The figures are of the id with its default arguments, apart from ``sensors`` and ``randomize`` (rig and scenario together,
-    or neither). An environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no
-    scores.
+    Returns
+    -------
+    dict of str to dict
+        Role (``"shut valves"``, ``"random valves"``, ``"paper's law"``, ``"best classical law"``, ``"best learned policy"``)
+        -> the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over episodes
+        of the settled error; None where most are lost), and the fractions ``lost`` and ``success``.
+
+    Raises
+    ------
+    ValueError
+        Names what has no scores.
+
+    Notes
+    -----
+    ``birthsim study scores`` measures them; docs/scores.md has the tables.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> known = birthsim.reference_scores("BirthSIM/Circle-v1")
+    >>> known["shut valves"]["return"] < known["best classical law"]["return"]
+    True
     """
     names = {environment_id(scenario, kind): scenario for scenario in SCENARIOS for kind in ("", "Residual")}
     if not isinstance(environment, str) or environment not in names:
@@ -58,8 +83,34 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
 def normalized_score(
     environment: str, score: ArrayLike, sensors: str = "ideal", randomize: bool = True
 ) -> float | NDArray[np.float64]:
-    """An episode's return, undiscounted, or an array of them, on a scale where shut valves have 0 and the best classical law
-    has 100; see ``reference_scores`` for the arguments."""
+    """An episode's return on a scale where shut valves have 0 and the best classical controller has 100.
+
+    Parameters
+    ----------
+    environment : str
+        An id.
+    score : float or array-like
+        Sum of the rewards of an episode, undiscounted, or an array of such sums.
+    sensors, randomize
+        As of ``reference_scores``.
+
+    Returns
+    -------
+    float or array
+        As ``score``.
+
+    Raises
+    ------
+    ValueError
+        Names what has no scores, and a score that is no number.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> best = birthsim.reference_scores("BirthSIM/Circle-v1")["best classical law"]["return"]
+    >>> birthsim.normalized_score("BirthSIM/Circle-v1", best)
+    100.0
+    """
     known = reference_scores(environment, sensors, randomize)
     if np.asarray(score).dtype.kind not in "iuf":
         raise ValueError(f"score = {shown(score)}; allowed: a number or an array of numbers")

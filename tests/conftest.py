@@ -3,6 +3,7 @@
 import os
 import signal
 from collections import Counter
+from importlib import import_module
 
 # LAPACK's threads wait for each other longer than the small matrices here take; NumPy reads this when it is imported. PyTorch's
 # wait with the processor in their hands: on a busy machine that takes ten times as long.
@@ -13,7 +14,7 @@ import gymnasium
 import pytest
 from hypothesis import settings
 
-from tests.console import run
+from tests.console import ROOT, run
 from tests.live import browser
 
 # A process that a script starts in the background ignores Ctrl-C; tests that raise it need it.
@@ -51,6 +52,18 @@ def trained(tmp_path_factory, small):
     """A folder of birthsim train, and the process that made it."""
     folder = tmp_path_factory.mktemp("policies") / "deeper" / "policy"
     return folder, run("train", "--config", small, "--steps", 4096, "--seed", 3, "--authority", 60, "--out", folder)
+
+
+@pytest.fixture(scope="session")
+def generated():
+    """A module of docs/_generate, by its name with a dot before it."""
+
+    def module(name):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(ROOT / "docs")
+            return import_module(f"_generate{name}")
+
+    return module
 
 
 @pytest.fixture(scope="session")

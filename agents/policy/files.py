@@ -22,7 +22,26 @@ MEMORY = ("enters", "own")
 
 @dataclass(frozen=True)
 class Policy:
-    """A trained residual: the network, the environment it was trained on, what it may do, and how it was made."""
+    """A trained residual.
+
+    Parameters
+    ----------
+    network : PolicyNetwork
+        Observations (N, D) to actions (N, ``settings.size``), float32.
+    environment : str
+        The id that it was trained on.
+    settings : ResidualSettings
+        The controller below, the bound of its forces, N, and what else it may do.
+    training : dict
+        How it was made, as JSON.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> policy = birthsim.load_policy("circle")
+    >>> policy.settings.authority, policy.network.outputs == policy.settings.size
+    (100.0, True)
+    """
 
     network: PolicyNetwork
     environment: str

@@ -17,6 +17,7 @@ from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import CommandFunction, Controller, controller_of
+from baselines.registry import make_controller
 from baselines.staged import Driving, driving
 from baselines.tables import aligned, markdown
 from birthsim_env.assembly import Arguments, refuse_unknown, spelled_out
@@ -43,11 +44,38 @@ TIMED = 10
 
 @dataclass
 class Evaluation:
-    """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
+    """What a controller reached over E episodes.
 
-    ``required_strength_ratio`` is the fraction of the rig's strength that each episode asks for. ``returns``
-    are the sums of rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end. ``cost`` is
-    the controller's time per lane and call, us, which differs from run to run.
+    Parameters
+    ----------
+    controller : str
+        Its name.
+    seeds : list of int
+        Of the episodes, (E,).
+    metrics : dict of str to list of float
+        Metric -> its value in every episode, (E,); docs/reference/metrics.md has their units. Of a lost episode it is that
+        of the time before.
+    lost : list of bool
+        Which episodes terminated, (E,).
+    required_strength_ratio : list of float
+        Fraction of the rig's strength that each episode asks for, (E,).
+    returns : dict of float to list of float
+        Discount -> sum of the rewards of each episode, (E,).
+    success : list of bool
+        ``info["is_success"]`` at the end of each episode, (E,).
+    cost : float
+        The controller's time per lane and call, us, which differs from run to run.
+    traces : list of array
+        Tracking errors over time, m, (T, lanes, 2) for each batch of episodes that ran side by side.
+
+    Examples
+    --------
+    ``evaluate`` returns one.
+
+    >>> import birthsim
+    >>> found = birthsim.evaluate("BirthSIM/Probe-v2", "admittance", episodes=2, progress=False)
+    >>> sorted(found.summary()["settled_rms"])
+    ['max', 'mean', 'median', 'q95']
     """
 
     controller: str
@@ -87,21 +115,60 @@ class Evaluation:
 @spelled_out(*GIVEN)
 def evaluate(
     environment: str,
-    controller: Controller | CommandFunction,
-    name: str,
-    episodes: int,
-    seed: int,
+    controller: str | Controller | CommandFunction,
+    name: str | None = None,
+    episodes: int = 32,
+    seed: int = 0,
     progress: bool = True,
     **arguments: Unpack[Arguments],
 ) -> Evaluation:
-    """Run ``episodes`` episodes of a registered id under a controller, or a function of measurement and reference, which
-    commands at every control period.
+    """Run a controller through seeded episodes of an environment and measure it.
 
-    The episodes have the seeds seed, seed + 1, and so on. ``arguments`` go to the environment. An episode that terminates is
-    lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
-    episodes that are complete are returned.
+    Parameters
+    ----------
+    environment : str
+        An id, such as ``"BirthSIM/Circle-v1"``.
+    controller : str, Controller or callable
+        Its name, as ``make_controller`` takes it, which then assumes the rig that ``parameters`` describes; an object; or a
+        function of measurement and reference. It commands at every control period.
+    name : str, optional
+        What tables call it; else its name, or that of its class.
+    episodes : int
+        Number of episodes E.
+    seed : int
+        Of the first episode; the others have seed + 1, seed + 2 and so on.
+    progress : bool
+        Whether bars are shown.
+    action_mode, valves, sensors, force_sensor, randomize, parameters, reference, user_force, stiffness, duration
+        Arguments of the environment, see ``birthsim_env.env.BirthSIMEnv``.
+    picture_size, num_threads, clip_actions
+        The same.
+
+    Returns
+    -------
+    Evaluation
+        Metrics of every episode. One that terminates is lost: ``metrics`` holds its values up to that moment, ``summary``
+        counts them as infinite. After an interrupt (Ctrl-C) the episodes that are complete are returned.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> found = birthsim.evaluate("BirthSIM/Probe-v2", "admittance", episodes=2, randomize=True, progress=False)
+    >>> found.controller, found.lost
+    ('admittance', [False, False])
+    >>> found.settled_error()["median"] < 1.0
+    True
     """
     episodes, seed = checked_count("episodes", episodes, 1, MOST_EPISODES), checked_count("seed", seed, 0, MOST_SEED)
+    if name is None:
+        name = controller if isinstance(controller, str) else getattr(controller, "__name__", type(controller).__name__)
+    if isinstance(controller, str):
+        controller = make_controller(controller, load_parameters(arguments.get("parameters")))
     return evaluate_worlds(environment, controller, name, range(seed, seed + episodes), None, progress, **arguments)
 
 

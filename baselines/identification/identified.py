@@ -45,9 +45,34 @@ class Row:
 
 @dataclass(frozen=True)
 class Identified:
-    """``rows``, one per parameter; ``rig`` with their values; ``fit``, ``certainty`` of the fit of all parameters; ``noise`` as
-    the residuals have it, ``quick_noise`` as the log alone has it; ``notes`` on what of the log was left out; ``pull``, a
-    constant force that the log lacks."""
+    """What a log tells of a rig.
+
+    Parameters
+    ----------
+    rows : tuple of Row
+        One per parameter: its name, the owner's value, the estimate, ``low`` and ``high`` of the 95 % interval, and whether
+        the log determines it.
+    rig : Parameters
+        The rig with these values.
+    fit : Fit
+        The search for them.
+    certainty : Certainty
+        Of the fit of all parameters.
+    noise, quick_noise : Noise
+        Of pressures (Pa) and positions (m), as the residuals have it, and as the log alone has it.
+    notes : tuple of str
+        What of the log was left out, a line each.
+    pull : ForceOffset
+        A constant force that the log lacks.
+
+    Examples
+    --------
+    ``identify`` returns one; its docstring makes a log first, with which
+
+    >>> import birthsim
+    >>> print(birthsim.identify("log.csv").words()[0])  # doctest: +SKIP
+    cylinder1.coulomb_friction = 12.067 N, 95 % interval 11.996 to 12.138; was 12
+    """
 
     rows: tuple[Row, ...]
     rig: Parameters

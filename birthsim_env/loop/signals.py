@@ -78,7 +78,30 @@ class Setpoints(Rows):
 
 
 class Reference(Motion, Setpoints):
-    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,); ``command`` refuses other shapes."""
+    """What a controller is asked to do at one instant.
+
+    Parameters
+    ----------
+    rows : array, (15, N) or (15,)
+        SI units. Rows 0 to 7 are the target's ``position`` (x, y), m, ``velocity``, ``acceleration`` and ``jerk``; 8 and 9 are
+        ``stiffness``, the setpoints Kclx, Kcly, N/m; 10 to 13 are ``pneumatic_stiffness`` of cylinders 1 and 2, N/m, and
+        ``pneumatic_stiffness_rate``, N/(m s); 14 is ``stiffness_coupling``, Kclxy, N/m. Each is an attribute, a view.
+
+    Notes
+    -----
+    The closed-loop stiffness asked for is [[Kclx, Kclxy], [Kclxy, Kcly]]; ``compliant_target`` is (19) of Herzig et al., IROS
+    2015, doi 10.1109/IROS.2015.7353583.
+
+    Examples
+    --------
+    A hand that pushes with 20 N along x against 2000 N/m finds the end effector 10 mm further:
+
+    >>> import numpy as np, birthsim
+    >>> reference = birthsim.Reference(np.zeros((15, 1)))
+    >>> reference.position[:, 0], reference.stiffness[:, 0] = (0.5, 0.0), (2000.0, 2000.0)
+    >>> reference.compliant_target(np.array([[20.0], [0.0]])).tolist()
+    [[0.51], [0.0]]
+    """
 
     def __init__(self, rows: Array) -> None:
         self.rows = rows
@@ -103,13 +126,36 @@ REFERENCES = Reference.size
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the sensors say at one instant, SI units.
+    """What the sensors say at one instant, over N lanes; without the lane axis, (2,) and (4,), for one rig.
 
-    ``position`` (2, N) of the end effector was taken at ``position_time`` (N,), at or before ``time`` (N,). ``velocity``
-    (2, N) is measured, or, where ``sampled`` is True, only the low-passed difference of rare and late position samples, which
-    a controller will want to replace by an observer of its own. ``pressures`` (4, N) are those of chambers P1, N1, P2, N2,
-    absolute. ``user_force`` (2, N) is that of a force sensor at the end effector. ``acceleration`` (2, N) is that of a sensor
-    there; None without one.
+    Parameters
+    ----------
+    time : array, (N,)
+        s since the episode began.
+    position : array, (2, N)
+        Of the end effector, x and y, m.
+    position_time : array, (N,)
+        When the position was taken, s, at or before ``time``.
+    velocity : array, (2, N)
+        Of the end effector, m/s: measured, or, where ``sampled`` is True, only the low-passed difference of rare and late
+        samples of the position, which a controller will want to replace by an observer of its own.
+    pressures : array, (4, N)
+        Of chambers P1, N1, P2, N2, Pa absolute.
+    user_force : array, (2, N)
+        Of the hand, as a force sensor at the end effector has it, N.
+    sampled : bool
+        Whether positions are samples of a tracker.
+    acceleration : array, (2, N), or None
+        Of the end effector, as a sensor there has it, m/s2; None without one.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> worlds = birthsim.make_vec("BirthSIM/Probe-v2", num_envs=3, sensors="lab")
+    >>> observations, infos = worlds.reset(seed=0)
+    >>> measured = worlds.measurement
+    >>> measured.pressures.shape, measured.sampled, measured.acceleration
+    ((4, 3), True, None)
     """
 
     time: Array

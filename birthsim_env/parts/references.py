@@ -34,12 +34,28 @@ LONGEST, SHORTEST = 1e6, 1e-3
 
 
 class Trajectory:
-    """Where the end effector should be.
+    """Where the end effector should be; derive from it to make a target of your own.
 
+    Notes
+    -----
     A trajectory of your own overrides ``sample``, and the other two methods where it needs them. ``prepare(num_envs)`` is
     called once. ``begin(lane, rng)`` is called at the start of every episode of a lane, with that lane's own random stream.
     ``sample(time)`` gets the time of every lane since its episode began, s, (N,). It returns (8, N): x, y (m), vx, vy, ax, ay
     and jerks jx, jy, consistent with each other. ``timed`` says when it does something, where that is known.
+
+    Examples
+    --------
+    A target that moves slowly up and down:
+
+    >>> import numpy as np, birthsim
+    >>> class Bob(birthsim.Trajectory):
+    ...     def sample(self, time):
+    ...         sine, cosine, still = 0.02 * np.sin(time), 0.02 * np.cos(time), 0 * time
+    ...         return np.stack([0.5 + still, sine, still, cosine, still, -sine, still, -cosine])
+    >>> env = birthsim.make("BirthSIM/Circle-v1", reference=Bob())
+    >>> observation, info = env.reset(seed=0)
+    >>> info["target"].tolist()
+    [0.5, 0.0]
     """
 
     timed: Timed | None = None
@@ -103,7 +119,30 @@ def _circle(world: int, seen: Seen, memory: int, constants: int, tables: int, la
 
 
 class Circle(_Planned):
-    """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
+    """A circle at constant speed, which starts at its rightmost point.
+
+    Parameters
+    ----------
+    centre : (float, float)
+        x and y, m.
+    radius : float or (float, float)
+        m; a range (low, high) is drawn from at the start of every episode.
+    period : float or (float, float)
+        s a turn; below zero it runs clockwise.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> env = birthsim.make("BirthSIM/Circle-v1", reference=birthsim.Circle(radius=0.03, period=5.0))
+    >>> observation, info = env.reset(seed=0)
+    >>> info["target"].tolist()
+    [0.53, 0.0]
+    """
 
     planned = Round, _circle
 
@@ -180,8 +219,41 @@ def _path(world: int, seen: Seen, memory: int, constants: int, tables: int, lane
 class Path(_Planned):
     """A straight line, then an arc, at minimum jerk along the whole; at rest before ``begins`` and after ``ends``.
 
-    ``start`` (x, y) in m, ``heading`` in rad from x, ``length`` of the line and ``radius`` of the arc in m, ``angle`` of the
-    arc in rad (positive turns left), times in s. Where the line meets the arc the acceleration steps by speed^2 / radius.
+    Numbers may be ranges (low, high), from which every episode draws, but for the times.
+
+    Parameters
+    ----------
+    start : (float, float)
+        x and y, m.
+    heading : float
+        Of the line, rad from x.
+    length : float
+        Of the line, m.
+    radius : float
+        Of the arc, m.
+    angle : float
+        Of the arc, rad; above zero it turns left.
+    begins, ends : float
+        s since the episode began.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+
+    Notes
+    -----
+    Where the line meets the arc the acceleration steps by speed^2 / radius. Minimum jerk: Flash and Hogan, J. Neurosci. 5
+    (1985) 1688.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> ahead = birthsim.Path(start=(0.45, 0.0), length=0.05, begins=1.0, ends=3.0)
+    >>> env = birthsim.make("BirthSIM/Forceps-v1", reference=ahead)
+    >>> observation, info = env.reset(seed=0)
+    >>> info["target"].tolist()
+    [0.45, 0.0]
     """
 
     planned = Line, _path
@@ -218,7 +290,26 @@ class Path(_Planned):
 
 
 class FixedTarget(Path):
-    """Stay at a point (x, y), m."""
+    """A target that stays where it is.
+
+    Parameters
+    ----------
+    position : (float, float)
+        x and y, m; each may be a range (low, high), from which every episode draws.
+
+    Raises
+    ------
+    ValueError
+        Names the value and what is allowed.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> env = birthsim.make("BirthSIM/Circle-v1", reference=birthsim.FixedTarget((0.48, 0.01)))
+    >>> observation, info = env.reset(seed=0)
+    >>> info["target"].tolist()
+    [0.48, 0.01]
+    """
 
     def __init__(self, position: tuple[Range, Range] = (0.5, 0.0)) -> None:
         if not (isinstance(position, tuple) and len(position) == 2):

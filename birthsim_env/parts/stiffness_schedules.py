@@ -26,19 +26,46 @@ SOFTEST, STIFFEST = 1e-3, 1e7
 
 
 class StiffnessSchedule:
-    """What stiffness is asked for. A user's own schedule derives from this class.
+    """What stiffness is asked for, in phases.
 
-    ``sample(time)`` gets the time of every lane, s, (N,), and returns (7, N): Kclx, Kcly (N/m), the pneumatic stiffness
-    setpoints of cylinders 1 and 2 (N/m), their rates (N/(m s)), and Kclxy (N/m), which couples x and y.
+    Sequences have one entry per phase: a number, or a range (low, high), from which every episode draws.
 
-    The arguments have one entry per phase, a number or a range (low, high):
+    Parameters
+    ----------
+    times : sequence of float
+        s at which the phases start, the first 0.
+    closed_loop : sequence of float
+        Closed-loop stiffness, N/m, of both axes, or of x alone where ``closed_loop_y`` is given.
+    pneumatic1, pneumatic2 : sequence of float
+        Pneumatic stiffness of cylinders 1 and 2, N/m.
+    closed_loop_y : sequence of float, optional
+        Closed-loop stiffness along y, N/m.
+    closed_loop_xy : sequence of float, optional
+        What couples the axes, N/m; its square must be below the product of their stiffnesses.
+    transition : float
+        s that a change of the pneumatic stiffness takes, at minimum jerk; that of the closed loop is a step.
 
-    - ``times`` (s) at which the phases start, the first 0;
-    - ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given;
-    - ``closed_loop_xy`` (N/m), which couples the axes; its square must be below the product of their stiffnesses;
-    - ``pneumatic1``, ``pneumatic2`` (N/m) for the cylinders.
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
 
-    ``transition`` (s) is how long a change of the pneumatic stiffness takes. ``timed`` says when it changes something.
+    Notes
+    -----
+    A schedule of your own derives from this class and overrides ``sample(time)``, which gets the time of every lane, s, (N,),
+    and returns (7, N): Kclx, Kcly (N/m), the pneumatic stiffness setpoints of cylinders 1 and 2 (N/m), their rates (N/(m s)),
+    and Kclxy (N/m). ``timed`` says when it changes something.
+
+    Examples
+    --------
+    From 2000 to 4000 N/m after 8 s, as in Fig. 4 of the paper:
+
+    >>> import birthsim
+    >>> doubled = birthsim.StiffnessSchedule((0.0, 8.0), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
+    >>> env = birthsim.make("BirthSIM/Circle-v1", stiffness=doubled)
+    >>> observation, info = env.reset(seed=0)
+    >>> info["stiffness_setpoint"].tolist()
+    [2000.0, 2000.0]
     """
 
     timed: Timed | None = None

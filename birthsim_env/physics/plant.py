@@ -40,11 +40,36 @@ def checked(name: str, value: ArrayLike, shape: tuple[int, ...], unit: str) -> A
 
 
 class Plant:
-    """``num_envs`` rigs, integrated by Runge-Kutta steps of 0.25 ms; one lane is one rig.
+    """The plant alone: N rigs side by side, without Gymnasium, sensors or a controller; one lane is one rig.
 
-    ``parameters`` is one rig for all lanes (a ``Parameters`` or the path of a TOML file) or a sequence with one per lane.
-    ``state`` is an array (18, num_envs) with the rows of ``STATE_NAMES``, SI units; it may be read and written. It starts at
-    mid stroke, at rest, with pressures that balance the weight.
+    Parameters
+    ----------
+    parameters : Parameters, path, None, or a sequence of them
+        One rig for all lanes, or one per lane; None stands for the defaults.
+    num_envs : int
+        Number of lanes N.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+
+    Notes
+    -----
+    ``state`` (18, N), with the rows of ``STATE_NAMES``, SI units, may be read and written. It starts at mid stroke, at rest,
+    with pressures that balance the weight, and is integrated by Runge-Kutta steps of 0.25 ms. The equations are those of
+    Herzig et al., IROS 2015, doi 10.1109/IROS.2015.7353583; each file of ``birthsim_env/physics`` names its further sources.
+
+    Examples
+    --------
+    A hand pushes two rigs with 10 N along x for 50 ms, while the valves stay shut:
+
+    >>> import numpy as np, birthsim
+    >>> plant = birthsim.Plant(num_envs=2)
+    >>> before = plant.end_effector()[0]
+    >>> state = plant.advance(np.zeros((4, 2)), np.array([[10.0, 10.0], [0.0, 0.0]]), 0.05)
+    >>> state.shape, bool((plant.end_effector()[0] > before).all())
+    ((18, 2), True)
     """
 
     def __init__(self, parameters: Parameters | str | Path | Sequence[Parameters] | None = None, num_envs: int = 1) -> None:

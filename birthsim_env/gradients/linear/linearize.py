@@ -56,10 +56,37 @@ and the atmosphere's, deep inside the laminar range, where the slope is the same
 def balanced_pressures(
     parameters: Parameters | str | Path | None, pose: ArrayLike, pneumatic_stiffness: ArrayLike = (4600.0, 2300.0)
 ) -> Array:
-    """Pressures of chambers P1, N1, P2, N2, (4,), Pa, that carry the weight at rest at an end effector position (2,), m.
+    """Pressures that carry the weight at rest.
 
-    ``pneumatic_stiffness`` (2,), N/m, is that of (9); one out of reach is approached. Raises ``ValueError`` for a pose
-    outside the workspace and for a stiffness that is not finite.
+    Parameters
+    ----------
+    parameters : Parameters, path, mapping or None
+        The rig.
+    pose : array-like, (2,)
+        Position x, y of the end effector, m.
+    pneumatic_stiffness : array-like, (2,)
+        Of cylinders 1 and 2, N/m; one out of reach is approached.
+
+    Returns
+    -------
+    array, (4,)
+        Of chambers P1, N1, P2, N2, Pa absolute.
+
+    Raises
+    ------
+    ValueError
+        For a pose outside the workspace, and a stiffness that is not finite.
+
+    Notes
+    -----
+    The pneumatic stiffness is (9) of Herzig et al., IROS 2015, doi 10.1109/IROS.2015.7353583.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> pressures = birthsim.balanced_pressures(None, (0.5, 0.0))
+    >>> pressures.shape, bool((pressures > 1e5).all())
+    ((4,), True)
     """
     rig = load_parameters(parameters)
     piston = geometry.inverse_geometry(checked("pose", pose, (2,), "m"), rig)
@@ -77,14 +104,44 @@ def linearize(
     openings: ArrayLike = (0.0, 0.0, 0.0, 0.0),
     force: ArrayLike = (0.0, 0.0),
 ) -> LinearModel:
-    """The plant near rest at an end effector position ``pose`` (2,), m, as a ``LinearModel``; air is at ambient temperature.
+    """The plant near rest as a linear model, with air at ambient temperature.
 
-    A handle on a structure that bends is where it carries the hand's force. States of options that a rig has not are left out.
+    Parameters
+    ----------
+    parameters : Parameters, path, mapping or None
+        The rig.
+    pose : array-like, (2,)
+        Position x, y of the end effector, m.
+    pressures : array-like, (4,), optional
+        Of chambers P1, N1, P2, N2, Pa absolute; else ``balanced_pressures``.
+    friction : str
+        ``"stuck"``: the bristle of each piston is a spring; ``"sliding"``: viscous friction alone is left.
+    openings : array-like, (4,)
+        Of the chambers' spools, -1 to 1.
+    force : array-like, (2,)
+        Of the hand, N.
 
-    ``pressures`` (4,), Pa absolute, of chambers P1, N1, P2, N2 (default: ``balanced_pressures``); ``openings`` (4,) of their
-    spools; ``force`` (2,), N, of the hand; ``friction`` "stuck" or "sliding" (see above). Inputs are the openings that spools
-    go to and the hand's force; deadband and hysteresis of the valves are left out. Raises ``ValueError`` for a pose outside the
-    workspace, and pressures that the air cannot have or friction cannot hold.
+    Returns
+    -------
+    LinearModel
+        A, B, C, D with names and units. Inputs are the openings that spools go to and the hand's force.
+
+    Raises
+    ------
+    ValueError
+        For a pose outside the workspace, and pressures that the air cannot have or friction cannot hold.
+
+    Notes
+    -----
+    Deadband and hysteresis of the valves are left out, and so are states of options that a rig has not. A handle on a
+    structure that bends is where it carries the hand's force. docs/linear.md compares the model with the plant.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> model = birthsim.linearize(None, (0.5, 0.0), friction="sliding")
+    >>> model.A.shape, model.inputs[-1]
+    ((16, 16), Signal(name='Fy', unit='N'))
     """
     rig = load_parameters(parameters)
     p = parameter_array(rig, 1)
@@ -127,10 +184,33 @@ def linearize(
 
 
 def linearize_lanes(plant: Plant, opening_command: ArrayLike, user_force: ArrayLike) -> Jacobians:
-    """The derivatives of N plants where they are, moving or at rest, under openings (4, N) and forces of the hand (2, N), N.
+    """The derivatives of N plants where they are, moving or at rest.
 
-    Along a trajectory its states are those of the lanes. Openings are those that spools go to. Raises ``ValueError`` for wrong
-    shapes and values that are not finite.
+    Parameters
+    ----------
+    plant : Plant
+        N lanes; along a trajectory its states are those of the lanes.
+    opening_command : array-like, (4, N)
+        Openings that the spools of chambers P1, N1, P2, N2 go to, -1 to 1.
+    user_force : array-like, (2, N)
+        Of the hand, N.
+
+    Returns
+    -------
+    Jacobians
+        A (N, S, S), B (N, S, 6), C (N, 12, S), D (N, 12, 6), with the rates (S, N) and outputs (12, N) there.
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes and values that are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np, birthsim
+    >>> found = birthsim.linearize_lanes(birthsim.Plant(num_envs=3), np.zeros((4, 3)), np.zeros((2, 3)))
+    >>> found.A.shape, found.D.shape
+    ((3, 18, 18), (3, 12, 6))
     """
     u = checked("opening_command", opening_command, (4, plant.num_envs), "1")
     f = checked("user_force", user_force, (2, plant.num_envs), "N")

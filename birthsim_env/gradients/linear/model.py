@@ -56,9 +56,27 @@ class Jacobians(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearModel:
-    """dx/dt = A x + B u, y = C x + D u for deviations x, u, y from the operating point ``at``, SI units.
+    """dx/dt = A x + B u, y = C x + D u for deviations x, u, y from an operating point, SI units.
 
-    ``states``, ``inputs`` and ``outputs`` name rows and columns; each is a ``Signal`` of name and unit.
+    Parameters
+    ----------
+    A, B, C, D : array
+        (S, S), (S, 6), (12, S), (12, 6).
+    states, inputs, outputs : tuple of Signal
+        Name and unit of every row and column.
+    at : OperatingPoint
+        Where the model was taken.
+
+    Examples
+    --------
+    How far a hand's slow push along x moves a rig whose valves stay shut, mm/N:
+
+    >>> import birthsim
+    >>> model = birthsim.linearize(None, (0.5, 0.0), friction="sliding")
+    >>> [one.name for one in model.inputs], model.outputs[0]
+    (['u1P', 'u1N', 'u2P', 'u2N', 'Fx', 'Fy'], Signal(name='x', unit='m'))
+    >>> bool(0.1 < 1e3 * abs(model.frequency_response([0.5])[0, 0, 4]) < 1.0)
+    True
     """
 
     A: Array

@@ -32,8 +32,10 @@ MOST = 100
 
 
 class UserForce:
-    """The hand (or the uterus) that pushes the end effector.
+    """The hand (or the uterus) that pushes the end effector; derive from it to make one of your own.
 
+    Notes
+    -----
     Three methods make a hand; a class of your own overrides those that it needs.
 
     ``prepare(num_envs)`` is called once. ``begin(lane, rng)`` is called at the start of every episode of a lane, with that
@@ -46,6 +48,21 @@ class UserForce:
 
     A component that changes faster than ``jump_rate``, N/s, counts as a jump: no controller can follow it, and
     ``info["since_jump"]`` starts anew. ``timed`` says when it does something, where that is known.
+
+    Examples
+    --------
+    A hand that pulls to the right with 10 N, twice as hard in every second lane:
+
+    >>> import numpy as np, birthsim
+    >>> class Pull(birthsim.UserForce):
+    ...     def prepare(self, num_envs):
+    ...         self.strength = np.where(np.arange(num_envs) % 2, 20.0, 10.0)
+    ...     def force(self, time, position, velocity):
+    ...         return np.stack([self.strength + 0 * time, 0 * time], axis=1)
+    >>> worlds = birthsim.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force=Pull(), duration=1.0)
+    >>> observations, infos = worlds.reset(seed=0)
+    >>> infos["user_force"].tolist()
+    [[10.0, 0.0], [20.0, 0.0]]
     """
 
     closed_loop = False
@@ -154,7 +171,35 @@ def _checked_knots(name: str, knots: Any, lanes: int = 1, like: Array = _NUMBERS
 
 
 class ForceProfile(CompiledForce):
-    """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
+    """A force that is linear between knots, and constant before the first and after the last.
+
+    Parameters
+    ----------
+    knots : list of (float, float, float), optional
+        (time, Fx, Fy), s since the episode began and N, with times that do not fall; else no force.
+
+    Raises
+    ------
+    ValueError
+        For knots that are not finite or whose times fall.
+
+    Notes
+    -----
+    A class of your own may override ``knots(rng)``, which returns such a list for every episode.
+
+    Examples
+    --------
+    A push along x that rises to 20 N from 1 s to 2 s:
+
+    >>> import birthsim
+    >>> push = birthsim.ForceProfile([(1.0, 0.0, 0.0), (2.0, 20.0, 0.0)])
+    >>> env = birthsim.make("BirthSIM/Circle-v1", user_force=push)
+    >>> observation, info = env.reset(seed=0)
+    >>> for _ in range(150):
+    ...     observation, reward, terminated, truncated, info = env.step(env.action_space.sample() * 0)
+    >>> float(info["time"]), [round(float(force), 6) for force in info["user_force"]]
+    (1.5, [10.0, 0.0])
+    """
 
     in_state: ClassVar[Declared] = {"_knots": Kept(grows=True, shortest=1), "_counts": Kept(1, "_knots", whole=True)}
 

@@ -31,10 +31,46 @@ FASTEST_RATE = 7000.0
 class Parameters:
     """A whole rig. ``Parameters()`` is the paper's BirthSIM with the assumptions of the design made explicit.
 
-    Every part is a frozen dataclass; ``replace`` makes a changed copy, ``from_toml`` and ``to_toml`` read and write a
-    laboratory's own rig (a file names only what differs from the defaults). ``ranges`` are the owner's own for domain
-    randomisation, (dotted name, low, high): the table ``[randomize]`` of a file, ``"mechanics.mass" = [7.2, 10.8]``.
-    Raises ``ValueError`` naming the field, its value and what is allowed.
+    Parameters
+    ----------
+    geometry : Geometry
+        Of the linkage, m.
+    cylinder1, cylinder2 : Cylinder
+        Bores and strokes (m), friction of the seals (N, N s/m).
+    mechanics : Mechanics
+        Mass (kg), gravity (m/s2), end stops, and how the structure bends.
+    friction : Friction
+        Its law, and what both cylinders share of it.
+    chambers : Chambers
+        Dead volume (m3), heat transfer, leaks and tubes.
+    valves : Valves
+        Their conductance and what is imperfect in their spools.
+    air : Air
+        Supply and atmosphere (Pa), temperature (K), and the gas itself.
+    electronics : Electronics
+        Control period (s), sensors and their errors.
+    ranges : tuple of (str, float, float)
+        The owner's own ranges for domain randomisation, (dotted name, low, high): the table ``[randomize]`` of a file,
+        ``"mechanics.mass" = [7.2, 10.8]``.
+
+    Raises
+    ------
+    ValueError
+        Names the field, its value and what is allowed.
+
+    Notes
+    -----
+    Every part is a frozen dataclass; docs/reference/rig.md lists all fields with their units, limits and sources. ``replace``
+    makes a changed copy, ``from_toml`` and ``to_toml`` read and write a laboratory's own rig; a file names only what differs
+    from the defaults. Strokes and forces are those of Herzig et al., IROS 2015, doi 10.1109/IROS.2015.7353583.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> rig = birthsim.Parameters().replace({"mechanics.mass": 4.0})
+    >>> rig.mechanics.mass, rig.cylinder2.stroke
+    (4.0, 0.4)
+    >>> env = birthsim.make("BirthSIM/Circle-v1", parameters=rig)
     """
 
     geometry: Geometry = Geometry()
@@ -215,8 +251,30 @@ def field_of(dotted: str) -> dataclasses.Field[Any]:
 
 
 def load_parameters(parameters: Parameters | Mapping[str, Any] | str | os.PathLike[str] | None) -> Parameters:
-    """What ``parameters=`` accepts everywhere: nothing (defaults), a ``Parameters``, the path of a TOML file, or what such a
-    file holds as a mapping: ``{"mechanics": {"mass": 4.0}}`` or ``{"mechanics.mass": 4.0}``."""
+    """Read what ``parameters=`` accepts everywhere.
+
+    Parameters
+    ----------
+    parameters : Parameters, mapping, path or None
+        A ``Parameters``, the path of a TOML file, or what such a file holds as a mapping, ``{"mechanics": {"mass": 4.0}}`` or
+        ``{"mechanics.mass": 4.0}``; None stands for the defaults.
+
+    Returns
+    -------
+    rig : Parameters
+        A valid rig.
+
+    Raises
+    ------
+    ValueError
+        Names the file and the field, the value and what is allowed.
+
+    Examples
+    --------
+    >>> import birthsim
+    >>> birthsim.load_parameters({"mechanics": {"mass": 4.0}}).mechanics.mass
+    4.0
+    """
     if parameters is None:
         return Parameters()
     if isinstance(parameters, Parameters):
