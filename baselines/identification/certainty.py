@@ -70,5 +70,5 @@ def _direction(fit: Fit, vector: Array, deviation: float) -> Direction:
     largest = vector[int(np.argmax(np.abs(vector)))]
     signed = vector * np.sign(largest)
     order = np.argsort(np.abs(signed))[::-1]
-    parts = tuple((fit.problem.quantities[k].name, float(signed[k])) for k in order if abs(signed[k]) >= NAMED)
+    parts = tuple((fit.problem.free[k].name, float(signed[k])) for k in order if abs(signed[k]) >= NAMED)
     return Direction(parts, deviation)

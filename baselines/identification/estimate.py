@@ -1,6 +1,6 @@
 """A rig from a trial: the parameters under which the predictions of its windows differ least from what was measured.
 
-The residuals are those of measurements, over their noise, and of the owner's values, over their spreads (``quantities``). Start
+The residuals are those of measurements, over their noise, and of the owner's values, over their spreads (``free``). Start
 states (``starts``) and what sensors add (``offsets``) are eliminated, so that SciPy's ``least_squares`` sees the parameters
 alone. A first search takes short windows, and begins at the owner's rig and at the best of many drawn ones; a second one takes
 all of the trial.
@@ -14,9 +14,9 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from baselines.identification.budget import UnsettledError
+from baselines.identification.free_parameters import FREE_PARAMETERS, FreeParameter, coordinates, limits, rig_at
 from baselines.identification.noise import guessed_noise, noise_from
 from baselines.identification.offsets import Offsets
-from baselines.identification.quantities import QUANTITIES, Quantity, coordinates, limits, rig_at
 from baselines.identification.robust import reweighted
 from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
@@ -56,16 +56,16 @@ Tick = Callable[[], object]
 
 
 class Problem:
-    """Residuals over coordinates (Q,) of ``quantities`` and their derivatives, with start states that fit best.
+    """Residuals over coordinates (Q,) of ``free`` and their derivatives, with start states that fit best.
 
     ``owner`` is the rig as its owner describes it, which gives what is not identified, the centre of the spreads and the limits
     (Q,) of the search; ``tick`` is called at every evaluation.
     """
 
-    def __init__(self, windows: Windows, noise: Noise, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick) -> None:
-        self.noise, self.quantities, self._owner, self._tick = noise, quantities, owner, tick
-        self.centre, self.limits = coordinates(owner, quantities), limits(owner, quantities)
-        self.spread: Array = np.array([one.spread for one in quantities])
+    def __init__(self, windows: Windows, noise: Noise, owner: Parameters, free: tuple[FreeParameter, ...], tick: Tick) -> None:
+        self.noise, self.free, self._owner, self._tick = noise, free, owner, tick
+        self.centre, self.limits = coordinates(owner, free), limits(owner, free)
+        self.spread: Array = np.array([one.prior.spread for one in free])
         self._start: Array = np.zeros((len(windows.starts), len(FREE)))
         self._at: tuple[bytes, Array, Array, Array]
         self._slopes: Slopes | None
@@ -81,7 +81,7 @@ class Problem:
 
     def rig_at(self, theta: Array) -> Parameters:
         """The rig at coordinates (Q,)."""
-        return rig_at(self._owner, self.quantities, theta)
+        return rig_at(self._owner, self.free, theta)
 
     def begin_anew(self, rig: Parameters, sizes: Array) -> None:
         """Begin at the start states that fit a rig and offsets of ``sizes`` best, also where the guess does not lead there."""
@@ -181,7 +181,7 @@ class Fit:
     The search has ``ended`` where it has not merely come to the most evaluations that it may make.
     """
 
-    quantities: tuple[Quantity, ...]
+    free: tuple[FreeParameter, ...]
     theta: Array
     rig: Parameters
     problem: Problem
@@ -222,36 +222,34 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
                 break
         residual = problem.settled(found.x)[1]
         noise = noise_from(problem.windows, problem.noise, problem.slopes, residual)
-    return Fit(
-        problem.quantities, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost), found.status > 0
-    )
+    return Fit(problem.free, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost), found.status > 0)
 
 
 def fit(
-    trial: Trial, owner: Parameters, seed: int = 0, quantities: tuple[Quantity, ...] = QUANTITIES, tick: Tick = lambda: None
+    trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
 ) -> Fit:
     """The parameters of a trial's rig; ``owner`` is the rig as its owner describes it, ``seed`` draws where to begin."""
     some = _spread_out(cut(trial, owner, SHORT))
-    problem = Problem(some, guessed_noise(trial), owner, quantities, tick)
+    problem = Problem(some, guessed_noise(trial), owner, free, tick)
     with problem.explained():
         drawn = _best_drawn(problem, np.random.default_rng(seed))
     tried = []
     for theta in (problem.centre, drawn):
-        tried.append(search(Problem(some, problem.noise, owner, quantities, tick), theta, MOST[0]))
-    return refine(trial, min(tried, key=lambda one: one.cost), owner, quantities, tick)
+        tried.append(search(Problem(some, problem.noise, owner, free, tick), theta, MOST[0]))
+    return refine(trial, min(tried, key=lambda one: one.cost), owner, free, tick)
 
 
-def refine(trial: Trial, first: Fit, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick = lambda: None) -> Fit:
-    """The second search, with all of a trial, for ``quantities``, repeated while it moves noise or latency (``MOVED``)
+def refine(trial: Trial, first: Fit, owner: Parameters, free: tuple[FreeParameter, ...], tick: Tick = lambda: None) -> Fit:
+    """The second search, with all of a trial, for ``free``, repeated while it moves noise or latency (``MOVED``)
     or leaves windows that fit worse than others.
 
-    What is not among ``quantities`` has the owner's value.
+    What is not among ``free`` has the owner's value.
     """
     found = first
     for _ in range(MOST_ROUNDS):
         before = found
-        problem = Problem(cut(trial, found.rig, budget=found.problem.windows.budget), found.noise, owner, quantities, tick)
-        theta = coordinates(found.rig, quantities)
+        problem = Problem(cut(trial, found.rig, budget=found.problem.windows.budget), found.noise, owner, free, tick)
+        theta = coordinates(found.rig, free)
         with problem.explained():
             problem.begin_anew(found.rig, found.problem.offsets.sizes)
             problem.reweigh(theta)

@@ -9,14 +9,14 @@ import tomli_w
 from baselines.identification.certainty import NORMAL, Certainty, certainty_of
 from baselines.identification.estimate import Fit, Tick, fit, refine
 from baselines.identification.force_offset import ForceOffset, force_offset
+from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY, FreeParameter
 from baselines.identification.log_columns import CHAMBERS
 from baselines.identification.noise import guessed_noise
-from baselines.identification.quantities import LATENCY, QUANTITIES, Quantity, value_of
 from baselines.identification.starts import Noise
 from baselines.identification.trial import Trial
 from birthsim_env.files import write_text
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Row:
 
     def words(self) -> str:
         """One line: name, value, interval, unit."""
-        unit = field_of(self.name).metadata["unit"]
+        unit = DECLARED[self.name].unit
         value = f"{self.name} = {self.value:.5g}{'' if unit == '-' else f' {unit}'}"
         interval = f"{self.low:.5g} to {self.high:.5g}"
         if self.determined:
@@ -105,7 +105,7 @@ class Identified:
         for row in self.rows:
             low, high = TUNED.get(row.name, (-inf, inf))
             if row.determined and not low <= row.value <= high:
-                unit = field_of(row.name).metadata["unit"]
+                unit = DECLARED[row.name].unit
                 lines.append(
                     f"{row.name} is outside {low:g} to {high:g} {unit}, for which controllers are tuned: "
                     "one that believes another rig may swing; give it this one (--parameters)"
@@ -153,7 +153,7 @@ REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance
 
 
 def identify(
-    trial: Trial, owner: Parameters, seed: int = 0, quantities: tuple[Quantity, ...] = QUANTITIES, tick: Tick = lambda: None
+    trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
 ) -> Identified:
     """The rig of a trial, as far as the trial determines it; all else is the owner's.
 
@@ -164,20 +164,20 @@ def identify(
     given = [name for name in REMEMBER if value_of(owner, name)]
     if given:
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
-    whole = fit(trial, owner, seed, quantities, tick)
+    whole = fit(trial, owner, seed, free, tick)
     with whole.problem.explained():
         certainty, pull = certainty_of(whole), force_offset(whole)
-    found = tuple(one for one, known in zip(quantities, certainty.determined, strict=True) if known)
-    last = whole if len(found) == len(quantities) or not found else refine(trial, whole, owner, found, tick)
+    found = tuple(one for one, known in zip(free, certainty.determined, strict=True) if known)
+    last = whole if len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
     rig = last.rig if found else owner
     rows = []
-    for one, theta, deviation, known in zip(quantities, whole.theta, certainty.deviation, certainty.determined, strict=True):
+    for one, theta, deviation, known in zip(free, whole.theta, certainty.deviation, certainty.determined, strict=True):
         value = value_of(rig, one.name)
-        middle, reach = (one.coordinate(value) if known else float(theta)), NORMAL * float(deviation)
+        middle, reach = (one.prior.coordinate(value) if known else float(theta)), NORMAL * float(deviation)
         if one.name == LATENCY and known:
             value, middle, reach = _latency(one, trial.period, middle, float(deviation))
-        low, high = one.value(middle - reach), one.value(middle + reach)
-        low = max(low, field_of(one.name).metadata["least"])
+        low, high = one.prior.value(middle - reach), one.prior.value(middle + reach)
+        low = max(low, DECLARED[one.name].least)
         rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(known)))
     changes = {row.name: row.value for row in rows if row.determined}
     noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
@@ -185,12 +185,12 @@ def identify(
     return Identified(tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull)
 
 
-def _latency(one: Quantity, period: float, middle: float, deviation: float) -> tuple[float, float, float]:
+def _latency(one: FreeParameter, period: float, middle: float, deviation: float) -> tuple[float, float, float]:
     """Value, coordinate and reach of the latency for the one at which rows show positions.
 
     A board that looks once a period shows a sample up to a period late, half a period in the mean; when in the period it
     arrived, no row tells.
     """
-    value = max(one.value(middle) - 0.5 * period, 0.0)
-    rounding = period / 12**0.5 / one.unit
-    return value, one.coordinate(value), NORMAL * (deviation**2 + rounding**2) ** 0.5
+    value = max(one.prior.value(middle) - 0.5 * period, 0.0)
+    rounding = period / 12**0.5 / one.prior.scale
+    return value, one.prior.coordinate(value), NORMAL * (deviation**2 + rounding**2) ** 0.5

@@ -160,7 +160,7 @@ def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> 
     for signs, others in itertools.product(signs_of_both, (best[bad], np.zeros_like(best[bad]))):
         bent = others.copy()
         for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, (at.FC1, at.FC2), signs, strict=True):
-            bent[:, free_row] = (sign * column[level] / column[at.BRISTLE_S0] - part.state[row]) / SPREAD[free_row]
+            bent[:, free_row] = (sign * column[level] / column[at.S0] - part.state[row]) / SPREAD[free_row]
         tries.append(bent)
     found, left = settle(windows.some(np.tile(bad, len(tries))), noise, rig, np.concatenate(tries), None)
     cost = np.sum(left**2, axis=1).reshape(len(tries), -1)

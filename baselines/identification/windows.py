@@ -151,7 +151,7 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     pistons_at(motion, Rig(column), joints)
     state[[at.Y1, at.Y2, at.V1, at.V2]] = joints
     for z, v, level in ((at.Z1, at.V1, at.FC1), (at.Z2, at.V2, at.FC2)):
-        state[z] = np.tanh(state[v] / 0.01) * column[level] / column[at.BRISTLE_S0]
+        state[z] = np.tanh(state[v] / 0.01) * column[level] / column[at.S0]
     wide = 2 * round(0.005 / period) + 3
     smooth = savgol_filter(bridged(trial.pressures), wide, 2, axis=1)
     state[list(at.PRESSURES)] = smooth[:, starts]

@@ -10,11 +10,11 @@ from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.identification.experiment import DURATION, propose, read_plan
+from baselines.identification.free_parameters import unmeasured
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log_columns import LogOptions
 from baselines.identification.log_file import read_trial, write_trial
-from baselines.identification.quantities import unmeasured
 from baselines.logs.writing import WRITERS
 from baselines.registry import make_controller
 from birthsim.command_line.settings import CONTROLLER, WORLD, Configured, Kind, RigFile, Seed, number, whole

@@ -14,7 +14,8 @@ from birthsim_env.gradients.symbols import Unknown
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.randomization import draw_rig
 from birthsim_env.parts.drawn.seeding import STREAMS, is_vectorised
-from birthsim_env.physics.compiled.lanes import Array, rows_of
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.rows import rows_of
 from birthsim_env.simulation import Simulation
 
 HEAD = '''"""Generated: what an episode draws."""

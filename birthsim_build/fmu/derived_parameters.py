@@ -1,16 +1,14 @@
 """What the plant computes from a rig's parameters, as C: the Python that does it is run on names instead of numbers."""
 
-import dataclasses
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from birthsim_env.physics.compiled.lanes import rows_of
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
+from birthsim_env.physics.rig.rows import Substitute, plant_parameters, rows_of
 
-SECTIONS = ("cylinder1", "cylinder2", "mechanics", "friction", "chambers", "valves", "air")
-"""Sections whose numbers may be set: the linkage stays as it was built, for the law and the target know it too."""
+STAYS = "geometry"
+"""The section whose numbers stay as they were built: the law and the target know the linkage too."""
 
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/", "greater": ">"}
 
@@ -41,30 +39,19 @@ def _text(term: Any) -> str:
     return term.text if isinstance(term, Expression) else float(term).hex()
 
 
-def parameter_names(rig: Parameters) -> list[str]:
-    """Dotted names of the numbers that may be set, in the order of ``SECTIONS``.
+def parameter_names() -> list[str]:
+    """Dotted names of the numbers that may be set, in the order of their declarations: those that the plant computes with.
 
-    Options (``quantities.quantity``) are not among them, since another plant is compiled for those, nor is the speed from which
-    collisions are reported, which the plant does not use.
+    Options (``declaration.Parameter``) are not among them, since another plant is compiled for those.
     """
     return [
-        f"{section}.{field.name}"
-        for section in SECTIONS
-        for field in dataclasses.fields(getattr(rig, section))
-        if not (isinstance(field.default, str) or field.metadata["option"] or field.name == "impact_speed")
+        name
+        for name, one in DECLARED.items()
+        if name in plant_parameters() and not (one.choices or one.option or name.partition(".")[0] == STAYS)
     ]
 
 
 def derived_parameters(rig: Parameters) -> list[str]:
     """C expressions of the rows of ``physics.compiled.lanes``, over ``p[k]``, the k-th of ``parameter_names``."""
-    place = {name: Expression(f"p[{k}]") for k, name in enumerate(parameter_names(rig))}
-    sections: dict[str, Any] = {"geometry": rig.geometry}
-    for section in SECTIONS:
-        part = getattr(rig, section)
-        names = [field.name for field in dataclasses.fields(part)]
-        sections[section] = SimpleNamespace(**{name: place.get(f"{section}.{name}", getattr(part, name)) for name in names})
-        for name, derived in vars(type(part)).items():
-            if isinstance(derived, property):
-                assert derived.fget is not None
-                setattr(sections[section], name, derived.fget(sections[section]))
-    return [_text(row) for row in rows_of(SimpleNamespace(**sections))]
+    place = {name: Expression(f"p[{k}]") for k, name in enumerate(parameter_names())}
+    return [_text(row) for row in rows_of(Substitute(lambda name: place[name] if name in place else value_of(rig, name)))]

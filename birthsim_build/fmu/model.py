@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -16,7 +16,7 @@ from birthsim_build.loops import World
 from birthsim_env.loop.rows import FORCE, MOTION, OPENING, POSITION, REFERENCE, SHOWN, STATE, WORLD
 from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics.compiled.lanes import STATES, Array
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 
 _PLANT, _LOOP = ("board", "plant", "sensors"), ("sensors", "law", "valves", "board", "plant")
 """Parts of a model's control period, in order. A law acts on what is measured when the period begins: the hand's force of that
@@ -54,7 +54,7 @@ def fmu_model(identifier: str, about: str, world: World, law: Part | None, rig: 
     start = image.view(np.float64)[HEAD:]
     variables = (
         Variable("time", "independent", "s", "simulated time"),
-        *(_parameter(name, rig) for name in parameter_names(rig)),
+        *(_parameter(name, rig) for name in parameter_names()),
         *(_variable(row, "input", start) for row in inputs),
         *(_variable(row, "output", start) for row in outputs),
     )
@@ -69,13 +69,10 @@ def _rows(numbers: Sequence[int]) -> list[Row]:
 
 
 def _parameter(name: str, rig: Parameters) -> Variable:
-    section, _, field_name = name.partition(".")
-    part = getattr(rig, section)
-    about: Any = next(field for field in fields(part) if field.name == field_name).metadata
+    one, value = DECLARED[name], float(value_of(rig, name))
     # What must be more than its limit: the next number.
-    least = math.nextafter(about["above"], math.inf) if math.isfinite(about["above"]) else about["least"]
-    value = float(getattr(part, field_name))
-    return Variable(f"rig.{name}", "parameter", about["unit"], about["basis"], value, float(least), float(about["most"]))
+    least = math.nextafter(one.above, math.inf) if math.isfinite(one.above) else one.least
+    return Variable(f"rig.{name}", "parameter", one.unit, one.about, value, float(least), float(one.most))
 
 
 def _variable(row: Row, causality: str, start: Array) -> Variable:

@@ -113,7 +113,7 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
             y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
         )
 
-        s0, s1 = p[at.BRISTLE_S0, i], p[at.BRISTLE_S1, i]
+        s0, s1 = p[at.S0, i], p[at.S1, i]
         weakness1 = friction.inverse_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
         weakness2 = friction.inverse_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
         is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5

@@ -1,8 +1,8 @@
-"""Control board and sensors as data: what the sensor models ``lab`` and ``honest`` take their figures from."""
+"""Control board and sensors as data: what the sensor models ``lab`` and ``honest`` compute with."""
 
 from dataclasses import dataclass
 
-from birthsim_env.physics.rig.quantities import Part, quantity
+from birthsim_env.physics.rig.declaration import Prior, Section, parameter
 
 NO_LARGER = "an episode draws within +-"
 
@@ -12,159 +12,267 @@ as with 300, to 0.2 mm; with 20 Hz its settled error is 1.9 instead of 0.7 mm, a
 
 
 @dataclass(frozen=True)
-class Electronics(Part):
+class Electronics(Section, plant=False, shared=True):
     """Control board and the sensors of a laboratory.
 
-    The first five figures, bandwidth and noise of the acceleration are those of the sensor models ``lab`` and ``honest``, all
-    others those of ``honest`` alone: 0 switches an error off (of ``force_bandwidth``: the low-pass; of bits: the converter).
-    ``acceleration_bandwidth`` is 0 where the head has no acceleration sensor. The tracker is registered to the rig
-    at one point, where its distortion and scale do no harm and its noise is ``position_noise``. Ranges are drawn from with
-    ``honest`` sensors.
+    The first five parameters, bandwidth and noise of the acceleration are those of the sensor models ``lab`` and ``honest``,
+    all others those of ``honest`` alone: 0 switches an error off (of ``force_bandwidth``: the low-pass; of bits: the
+    converter). The tracker is registered to the rig at one point, where its distortion and scale do no harm and its noise is
+    ``position_noise``. Ranges are drawn from with ``honest`` sensors.
     """
 
-    control_period: float = quantity(0.001, "s", "assumed", least=0.00025, most=0.01)
-    position_rate: float = quantity(240.0, "Hz", "trakSTAR, assumed", least=0.1, most=4000)
-    position_noise: float = quantity(
-        1e-4, "m", "assumed; standard deviation per axis", least=0, most=1, randomized=(5e-5, 3e-4)
+    control_period: float = parameter("s", "control period", default=0.001, source="assumed", least=0.00025, most=0.01)
+    position_rate: float = parameter(
+        "Hz", "samples per second of the tracker", default=240.0, source="trakSTAR, assumed", least=0.1, most=4000
     )
-    position_latency: float = quantity(0.004, "s", "assumed", least=0, most=0.05, randomized=(0.002, 0.015))
-    pressure_noise: float = quantity(
-        500.0, "Pa", "assumed; standard deviation per chamber", least=0, most=1e6, randomized=(200, 1000)
-    )
-
-    force_noise: float = quantity(
-        0.1,
-        "N",
-        "assumed; standard deviation per axis and period, six-axis strain gauges of 300 N",
-        least=0,
-        most=100,
-        randomized=(0.03, 0.3),
-        option=True,
-    )
-    force_bias: float = quantity(
-        1.0, "N", f"assumed, drift since it was tared; {NO_LARGER}", least=0, most=1e3, randomized=(0, 2), option=True
-    )
-    force_gain_error: float = quantity(
-        0.01, "-", f"assumed, uncertainty of calibration; {NO_LARGER}", least=0, most=0.9, randomized=(0, 0.05), option=True
-    )
-    force_crosstalk: float = quantity(
-        0.01,
-        "-",
-        f"assumed, below 2 % in good six-axis sensors; of the other axis, {NO_LARGER}",
-        least=0,
-        most=0.9,
-        randomized=(0, 0.03),
-        option=True,
-    )
-    force_bandwidth: float = quantity(
-        200.0, "Hz", "assumed; -3 dB of a first-order low-pass", least=0, most=1e5, randomized=(100, 500), option=True
-    )
-    force_latency: float = quantity(
-        0.001, "s", "assumed; conversion and bus", least=0, most=0.05, randomized=(0, 0.004), option=True
-    )
-    force_range: float = quantity(300.0, "N", "assumed; full scale per axis, either way", above=0, most=1e6, option=True)
-
-    position_noise_growth: float = quantity(
-        4.0,
-        "-",
-        "of a magnetic dipole, whose gradient falls so; power of the distance from the transmitter",
-        least=0,
-        most=6,
-        randomized=(2, 4),
-        option=True,
-    )
-    position_distortion: float = quantity(
-        1e-3,
+    position_noise: float = parameter(
         "m",
-        "assumed; of metal nearby, RMS per axis of a smooth field that an episode draws",
-        least=0,
-        most=0.1,
-        randomized=(0, 2e-3),
-        option=True,
-    )
-    distortion_length: float = quantity(
-        0.6, "m", "assumed; wavelength of that field", least=0.05, most=100, randomized=(0.4, 1.0), option=True
-    )
-    position_scale_error: float = quantity(
-        0.005, "-", f"assumed; {NO_LARGER}", least=0, most=0.5, randomized=(0, 0.02), option=True
-    )
-    position_dropout: float = quantity(
-        0.005,
-        "-",
-        "assumed; fraction of the tracker's samples that are lost",
+        "standard deviation of the tracker's noise per axis",
+        default=1e-4,
+        source="assumed",
         least=0,
         most=1,
-        randomized=(0, 0.02),
-        option=True,
+        range=(5e-5, 3e-4),
     )
-    transmitter_x: float = quantity(
-        0.5, "m", "assumed; where the tracker's transmitter stands", least=-10, most=10, option=True
+    position_latency: float = parameter(
+        "s",
+        "latency of the tracker",
+        default=0.004,
+        source="assumed",
+        least=0,
+        most=0.05,
+        range=(0.002, 0.015),
+        identified=Prior(1.0, scale=0.005),
     )
-    transmitter_y: float = quantity(-0.3, "m", "assumed", least=-10, most=10, option=True)
-    registration_x: float = quantity(
-        0.5, "m", "assumed; where the tracker is registered to the rig", least=-10, most=10, option=True
-    )
-    registration_y: float = quantity(0.0, "m", "assumed", least=-10, most=10, option=True)
-
-    pressure_bias: float = quantity(
-        2000.0,
+    pressure_noise: float = parameter(
         "Pa",
-        f"assumed, 0.2 % of a cell of 10 bar; per chamber, {NO_LARGER}",
+        "standard deviation of a pressure cell's noise",
+        default=500.0,
+        source="assumed",
         least=0,
         most=1e6,
-        randomized=(0, 5000),
+        range=(200, 1000),
+    )
+
+    force_noise: float = parameter(
+        "N",
+        "standard deviation of the force sensor's noise per axis and period",
+        default=0.1,
+        source="assumed, six-axis strain gauges of 300 N",
+        least=0,
+        most=100,
+        range=(0.03, 0.3),
         option=True,
     )
-    pressure_range: float = quantity(1e6, "Pa", "assumed; full scale, absolute", above=0, most=1e8, option=True)
-
-    adc_bits: float = quantity(
-        14.0, "-", "assumed; of force and pressures, boards have 12 to 16", least=0, most=32, randomized=(12, 16), option=True
+    force_bias: float = parameter(
+        "N",
+        f"drift of the force sensor since it was tared; {NO_LARGER}",
+        default=1.0,
+        source="assumed",
+        least=0,
+        most=1e3,
+        range=(0, 2),
+        option=True,
     )
-    dac_bits: float = quantity(
-        14.0, "-", "assumed; of the valves' voltages, boards have 12 to 16", least=0, most=32, randomized=(12, 16), option=True
-    )
-    missed_periods: float = quantity(
-        0.001,
+    force_gain_error: float = parameter(
         "-",
-        "assumed; fraction of control periods in which the board neither reads nor writes",
+        f"uncertainty of the force sensor's calibration; {NO_LARGER}",
+        default=0.01,
+        source="assumed",
         least=0,
         most=0.9,
-        randomized=(0, 0.01),
+        range=(0, 0.05),
+        option=True,
+    )
+    force_crosstalk: float = parameter(
+        "-",
+        f"share of the other axis in a force; {NO_LARGER}",
+        default=0.01,
+        source="assumed, below 2 % in good six-axis sensors",
+        least=0,
+        most=0.9,
+        range=(0, 0.03),
+        option=True,
+    )
+    force_bandwidth: float = parameter(
+        "Hz",
+        "-3 dB of the force sensor's first-order low-pass",
+        default=200.0,
+        source="assumed",
+        least=0,
+        most=1e5,
+        range=(100, 500),
+        option=True,
+    )
+    force_latency: float = parameter(
+        "s",
+        "conversion of a force, and bus",
+        default=0.001,
+        source="assumed",
+        least=0,
+        most=0.05,
+        range=(0, 0.004),
+        option=True,
+    )
+    force_range: float = parameter(
+        "N",
+        "full scale of the force sensor per axis, either way",
+        default=300.0,
+        source="assumed",
+        above=0,
+        most=1e6,
         option=True,
     )
 
-    clock_jitter: float = quantity(
-        0.0,
+    position_noise_growth: float = parameter(
         "-",
-        "0 is a steady clock; the valves' voltages are late by up to this fraction of a period, up to 0.5 assumed of "
-        "boards without a real-time system",
+        "power of the distance from the transmitter with which the tracker's noise grows",
+        default=4.0,
+        source="of a magnetic dipole, whose gradient falls so",
+        least=0,
+        most=6,
+        range=(2, 4),
+        option=True,
+    )
+    position_distortion: float = parameter(
+        "m",
+        "of metal nearby, RMS per axis of a smooth field that an episode draws",
+        default=1e-3,
+        source="assumed",
+        least=0,
+        most=0.1,
+        range=(0, 2e-3),
+        option=True,
+    )
+    distortion_length: float = parameter(
+        "m", "wavelength of that field", default=0.6, source="assumed", least=0.05, most=100, range=(0.4, 1.0), option=True
+    )
+    position_scale_error: float = parameter(
+        "-",
+        f"error of the tracker's scale; {NO_LARGER}",
+        default=0.005,
+        source="assumed",
+        least=0,
+        most=0.5,
+        range=(0, 0.02),
+        option=True,
+    )
+    position_dropout: float = parameter(
+        "-",
+        "fraction of the tracker's samples that are lost",
+        default=0.005,
+        source="assumed",
+        least=0,
+        most=1,
+        range=(0, 0.02),
+        option=True,
+    )
+    transmitter_x: float = parameter(
+        "m", "where the tracker's transmitter stands", default=0.5, source="assumed", least=-10, most=10, option=True
+    )
+    transmitter_y: float = parameter(
+        "m", "where the tracker's transmitter stands", default=-0.3, source="assumed", least=-10, most=10, option=True
+    )
+    registration_x: float = parameter(
+        "m", "where the tracker is registered to the rig", default=0.5, source="assumed", least=-10, most=10, option=True
+    )
+    registration_y: float = parameter(
+        "m", "where the tracker is registered to the rig", default=0.0, source="assumed", least=-10, most=10, option=True
+    )
+
+    pressure_bias: float = parameter(
+        "Pa",
+        f"bias of a pressure cell; {NO_LARGER}",
+        default=2000.0,
+        source="assumed, 0.2 % of a cell of 10 bar",
+        least=0,
+        most=1e6,
+        range=(0, 5000),
+        option=True,
+    )
+    pressure_range: float = parameter(
+        "Pa", "full scale of a pressure cell, absolute", default=1e6, source="assumed", above=0, most=1e8, option=True
+    )
+
+    adc_bits: float = parameter(
+        "-",
+        "bits of the converter of force and pressures",
+        default=14.0,
+        source="assumed, boards have 12 to 16",
+        least=0,
+        most=32,
+        range=(12, 16),
+        option=True,
+    )
+    dac_bits: float = parameter(
+        "-",
+        "bits of the converter of the valves' voltages",
+        default=14.0,
+        source="assumed, boards have 12 to 16",
+        least=0,
+        most=32,
+        range=(12, 16),
+        option=True,
+    )
+    missed_periods: float = parameter(
+        "-",
+        "fraction of control periods in which the board neither reads nor writes",
+        default=0.001,
+        source="assumed",
+        least=0,
+        most=0.9,
+        range=(0, 0.01),
+        option=True,
+    )
+
+    clock_jitter: float = parameter(
+        "-",
+        "the valves' voltages are late by up to this fraction of a period; 0 is a steady clock",
+        default=0.0,
+        source="up to 0.5 assumed of boards without a real-time system",
         least=0,
         most=1,
         option=True,
-        worth=(0, 0.5),
+        range=(0, 0.5),
+        on_request=True,
     )
 
-    acceleration_bandwidth: float = quantity(
-        0.0,
+    acceleration_bandwidth: float = parameter(
         "Hz",
-        "0 is a head without an acceleration sensor; -3 dB of a first-order low-pass, 200 to 400 assumed of a "
-        "micromechanical one",
+        "-3 dB of the acceleration sensor's first-order low-pass; 0 is a head without one",
+        default=0.0,
+        source="200 to 400 assumed of a micromechanical one",
         least=0,
         most=1e5,
         option=True,
     )
-    acceleration_noise: float = quantity(
-        0.02,
+    acceleration_noise: float = parameter(
         "m/s2",
-        "assumed; standard deviation per axis and period, 100 ug/sqrt(Hz) over 400 Hz",
+        "standard deviation of the acceleration sensor's noise per axis and period",
+        default=0.02,
+        source="assumed, 100 ug/sqrt(Hz) over 400 Hz",
         least=0,
         most=100,
         option=True,
     )
-    acceleration_bias: float = quantity(
-        0.1, "m/s2", f"assumed, of the sensor and of gravity that was taken off; {NO_LARGER}", least=0, most=100, option=True
+    acceleration_bias: float = parameter(
+        "m/s2",
+        f"bias of the acceleration sensor, and of gravity that was taken off; {NO_LARGER}",
+        default=0.1,
+        source="assumed",
+        least=0,
+        most=100,
+        option=True,
     )
-    acceleration_gain_error: float = quantity(0.01, "-", f"assumed, per axis; {NO_LARGER}", least=0, most=0.9, option=True)
+    acceleration_gain_error: float = parameter(
+        "-",
+        f"error of the acceleration sensor's gain per axis; {NO_LARGER}",
+        default=0.01,
+        source="assumed",
+        least=0,
+        most=0.9,
+        option=True,
+    )
 
     def _check_together(self) -> None:
         if 0.0 < self.acceleration_bandwidth < SLOWEST:

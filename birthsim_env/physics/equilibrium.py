@@ -32,7 +32,7 @@ def balance(state: Array, stiffness: Array, p: Array) -> None:
             speed = state[v, i] if abs(state[v, i]) > REST_SPEED else 0.0
             level = friction.stribeck_level(speed, p[fc, i], p[fs, i], p[at.STRIBECK, i])
             has_bristle = p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
-            bristle = friction.steady_deflection(speed, level, p[at.BRISTLE_S0, i]) if has_bristle else 0.0
+            bristle = friction.steady_deflection(speed, level, p[at.S0, i]) if has_bristle else 0.0
             sliding = level if has_bristle else p[fc, i]
             drag = (math.copysign(sliding, speed) if speed != 0.0 else 0.0) + p[fv, i] * speed
             weight = weight1 if cylinder == 0 else weight2

@@ -42,12 +42,12 @@ def begin(world: World, seen: Seen, memory: FurtherStates, described: Rig, table
 @helper
 def piston_friction(x: Array, p: Array, i: int, speed: int, bristle: int, coulomb: int, static: int, viscous: int) -> float:
     """Friction on the rod, N, as in ``dynamics.right_hand_side``: along the motion it is positive and holds it back."""
-    v, z, s0 = x[speed, i], x[bristle, i], p[at.BRISTLE_S0, i]
+    v, z, s0 = x[speed, i], x[bristle, i], p[at.S0, i]
     if p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] <= 0.5:
         return friction.coulomb_force(v, p[coulomb, i], p[viscous, i], p[at.SIGN_SLOPE, i])
     weakness = friction.inverse_level(v, p[coulomb, i], p[static, i], p[at.STRIBECK, i])
     rate = friction.bristle_rate_by_law(v, z, weakness, s0, p[at.LUGRE, i] > 0.5, p[at.BREAKAWAY, i], p[at.STEEPNESS, i])
-    return friction.lugre_force(v, z, rate, s0, p[at.BRISTLE_S1, i], p[viscous, i])
+    return friction.lugre_force(v, z, rate, s0, p[at.S1, i], p[viscous, i])
 
 
 @helper

@@ -5,14 +5,12 @@ import shutil
 import subprocess
 import sys
 from contextlib import suppress
-from dataclasses import fields
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 
-from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from birthsim.exports import fmu
 from birthsim_build.fmu import archive
@@ -21,8 +19,8 @@ from birthsim_build.fmu.description import exponents
 from birthsim_env import Parameters, Plant
 from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES
-from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATE_NAMES, parameter_column
+from birthsim_env.physics.rig.parameters import DECLARED, load_parameters, value_of
 from tests.build.targets import build, imported, need_linker
 from tests.console import ROOT
 
@@ -177,13 +175,13 @@ def test_parameters_act_as_in_python(written, unit):
 
 
 def test_the_c_code_derives_parameters_as_python_does(tmp_path):
-    names = parameter_names(RIG)
+    names = parameter_names()
     rng = np.random.default_rng(0)
     rows = "\n".join(f"r[{k}] = {term};" for k, term in enumerate(derived_parameters(RIG)))
     (tmp_path / "derive.c").write_text(f"""#include <math.h>\n#include <stdio.h>
-int main(void) {{ double p[{len(names)}], r[65]; for (int k = 0; k < {len(names)}; k++) scanf("%la", p + k);
+int main(void) {{ double p[{len(names)}], r[{PARAMETERS}]; for (int k = 0; k < {len(names)}; k++) scanf("%la", p + k);
 {rows}
-for (int k = 0; k < 65; k++) printf("%a\\n", r[k]); return 0; }}""")
+for (int k = 0; k < {PARAMETERS}; k++) printf("%a\\n", r[k]); return 0; }}""")
     subprocess.run(["gcc", "-O1", "-o", tmp_path / "derive", tmp_path / "derive.c", "-lm"], check=True)
     for _ in range(5):
         free = [name for name in names if "diameter" not in name and "ratio" not in name]
@@ -323,8 +321,7 @@ def test_units_are_those_of_the_rig():
     assert exponents("m3/(s Pa)") == {"m": 4, "s": 1, "kg": -1}
     assert exponents("N s/m") == {"kg": 1, "s": -1}
     assert exponents("1") == exponents("-") == {}
-    for section in ("mechanics", "friction", "chambers", "valves", "air", "cylinder1"):
-        for field in fields(getattr(RIG, section)):
-            exponents(field.metadata["unit"])
+    for one in DECLARED.values():
+        exponents(one.unit)
     with pytest.raises(ValueError, match="unit = 'furlong'; allowed: "):
         exponents("furlong")

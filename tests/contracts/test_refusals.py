@@ -20,9 +20,9 @@ from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import Noise
 from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
+from birthsim_env.physics.rig.parameters import DECLARED
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.vector_env import BirthSIMVectorEnv
-from tests.physics.rig.test_parameters import FIELDS
 
 CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
 NAN, INF = math.nan, math.inf
@@ -60,7 +60,7 @@ def rig(**given):
 
 
 def beyond(least, most, above, **_):
-    """Numbers that are too small or too large for a field of the rig."""
+    """Numbers that are too small or too large for a parameter of the rig."""
     small = (above, least - 1e-3 * max(abs(least), 1e-3))
     return [value for value in (*small, 1.001 * most) if math.isfinite(value)]
 
@@ -121,7 +121,7 @@ TABLE = [
     (rig, "chambers.dead_volume", (4e-6,), "at least 4.91e-06 m3"),
     (partial(rig, **{"cylinder2.piston_diameter": 0.05}), "chambers.dead_volume", (1e-5,), "at least 1.96e-05 m3"),
     (rig, "electronics.transmitter_y", (0.0,), "another place"),
-    *((rig, f"{section}.{one.name}", beyond(**one.metadata), f"({one.metadata['unit']})") for section, one in FIELDS),
+    *((rig, name, beyond(**vars(one)), f"({one.unit})") for name, one in DECLARED.items()),
     (rig, "electronics.acceleration_bandwidth", (39.0,), "0, which is no sensor, or at least 40 Hz"),
     (named, "controller", ("backsteping",), "a registered name, or path/to/file.py"),
     (named, "controller", ("",), "backstepping, admittance, pid"),

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.identification.certainty import NORMAL, certainty_of
 from baselines.identification.estimate import Fit
-from baselines.identification.quantities import QUANTITIES
+from baselines.identification.free_parameters import FREE_PARAMETERS
 from baselines.identification.starts import Noise
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -26,9 +26,9 @@ def estimates(errors: Array, slopes: Array) -> tuple[Array, list[Fit]]:
             derivatives=-slopes,
             settled=lambda _, residual=residual: (None, residual),
             spread=np.ones(COUNT),
-            quantities=QUANTITIES[:COUNT],
+            free=FREE_PARAMETERS[:COUNT],
         )
-        fits.append(Fit(QUANTITIES[:COUNT], theta, Parameters(), problem, -tall, Noise(1.0, 1.0), 0.0))  # type: ignore[arg-type]
+        fits.append(Fit(FREE_PARAMETERS[:COUNT], theta, Parameters(), problem, -tall, Noise(1.0, 1.0), 0.0))  # type: ignore[arg-type]
     return found, fits
 
 
@@ -62,7 +62,7 @@ def test_the_weakest_direction_is_named() -> None:
     slopes[..., 1] = slopes[..., 0] + 0.01 * rng.normal(size=(WINDOWS, ROWS))
     _, fits = estimates(rng.normal(size=(1, WINDOWS, ROWS)), slopes)
     known = certainty_of(fits[0])
-    names = [QUANTITIES[k].name for k in range(2)]
+    names = [FREE_PARAMETERS[k].name for k in range(2)]
     assert sorted(name for name, _ in known.weakest[0].parts) == sorted(names)
     parts = dict(known.weakest[0].parts)
     assert parts[names[0]] * parts[names[1]] == pytest.approx(-0.5, abs=0.01)

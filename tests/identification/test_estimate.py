@@ -9,18 +9,18 @@ import pytest
 from baselines.identification import estimate, starts
 from baselines.identification.certainty import certainty_of
 from baselines.identification.estimate import Problem, fit, refine, search
+from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY, FreeParameter, coordinates, limits, rig_at
 from baselines.identification.identified import identify
 from baselines.identification.noise import guessed_noise
-from baselines.identification.quantities import LATENCY, QUANTITIES, Quantity, coordinates, limits, rig_at, value_of
 from baselines.identification.starts import Noise
 from baselines.identification.trial import Trial
 from baselines.identification.windows import cut
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, value_of
 from tests.identification.trials import OWNER, TRUE, part, trial
 
 SOME = tuple(
     one
-    for one in QUANTITIES
+    for one in FREE_PARAMETERS
     if one.name in ("cylinder1.coulomb_friction", "mechanics.mass", "valves.sonic_conductance", "valves.time_constant")
 )
 KNOWN = TRUE.replace({one.name: value_of(OWNER, one.name) for one in SOME} | {LATENCY: 0.0})
@@ -45,14 +45,14 @@ def test_without_noise_the_rig_comes_back(monkeypatch: pytest.MonkeyPatch) -> No
 
 def problem(noise: Noise | None = None) -> Problem:
     windows = cut(part(trial(), 0, 2000), OWNER, 0.1).some(np.array([3, 9, 14]))
-    return Problem(windows, noise or guessed_noise(trial()), OWNER, QUANTITIES, lambda: None)
+    return Problem(windows, noise or guessed_noise(trial()), OWNER, FREE_PARAMETERS, lambda: None)
 
 
 def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     """J'r against central differences of the cost, whose start states and offsets are sought anew at every place."""
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
     monkeypatch.setattr(estimate, "STILL", 1e-5)
-    asked, theta = problem(), coordinates(TRUE, QUANTITIES)
+    asked, theta = problem(), coordinates(TRUE, FREE_PARAMETERS)
     asked.jacobian(theta)  # whose slopes are those of where the start states end
     asked.residuals(theta + 1e-9)
     gradient = asked.jacobian(theta).T @ asked.residuals(theta)
@@ -62,17 +62,17 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
         sides = [0.5 * np.sum(asked.residuals(theta + sign * step * np.eye(len(theta))[k]) ** 2) for sign in (1.0, -1.0)]
         central = (sides[0] - sides[1]) / (2 * step)
         # In standard deviations of this coordinate: a hundredth of one is lost in the interval.
-        assert abs(gradient[k] - central) / size[k] < 0.05, QUANTITIES[k].name
+        assert abs(gradient[k] - central) / size[k] < 0.05, FREE_PARAMETERS[k].name
 
 
-@pytest.mark.parametrize("one", QUANTITIES, ids=lambda one: one.name)
-def test_coordinates_go_there_and_back(one: Quantity) -> None:
+@pytest.mark.parametrize("one", FREE_PARAMETERS, ids=lambda one: one.name)
+def test_coordinates_go_there_and_back(one: FreeParameter) -> None:
     value = value_of(TRUE, one.name)
-    assert one.value(one.coordinate(value)) == pytest.approx(value, rel=1e-12)
+    assert one.prior.value(one.prior.coordinate(value)) == pytest.approx(value, rel=1e-12)
     low, high = limits(OWNER, (one,))
     for edge in (low, high):
         rig_at(OWNER, (one,), edge)
-    assert low[0] < one.coordinate(value_of(OWNER, one.name)) < high[0]
+    assert low[0] < one.prior.coordinate(value_of(OWNER, one.name)) < high[0]
 
 
 def test_the_noise_is_found_from_the_log_alone() -> None:
@@ -157,7 +157,7 @@ def test_fewer_parameters_are_fitted_anew_from_a_fit() -> None:
     """A fit of some parameters is the same from wherever it begins."""
     short = part(trial(), 0, 2200)
     owner = TRUE.replace({"mechanics.mass": 3.0, "valves.sonic_conductance": 3.9e-9})
-    mass = tuple(one for one in QUANTITIES if one.name in ("mechanics.mass", "valves.sonic_conductance"))
+    mass = tuple(one for one in FREE_PARAMETERS if one.name in ("mechanics.mass", "valves.sonic_conductance"))
     first = fit(short, owner, 0, mass)
     again = refine(short, first, owner, mass)
     deviation = certainty_of(first).deviation

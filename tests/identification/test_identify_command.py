@@ -12,7 +12,7 @@ from baselines.identification.identified import identify as identify_trial
 from baselines.identification.log_file import write_trial
 from baselines.identification.trial import Trial
 from birthsim.commands import identify
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 from tests.console import call
 from tests.figures import caught
 from tests.identification.broken import changed, put
@@ -90,7 +90,7 @@ def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
 
 @pytest.mark.parametrize("name", REMEMBER)
 def test_a_rig_with_states_that_no_log_holds_is_refused(name: str) -> None:
-    rig = OWNER.replace({name: field_of(name).metadata["worth"][1]})
+    rig = OWNER.replace({name: DECLARED[name].range[1]})
     with pytest.raises(ValueError, match=f"{name} = .*; allowed for an identification: 0, "):
         identify_trial(part(trial(), 0, 2100), rig)
 

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 
 from baselines.identification.estimate import Problem
+from baselines.identification.free_parameters import FREE_PARAMETERS, coordinates
 from baselines.identification.noise import guessed_noise
-from baselines.identification.quantities import QUANTITIES, coordinates
 from baselines.identification.windows import cut
 from tests.identification.trials import TRUE, part, trial
 
@@ -24,9 +24,9 @@ def test_biases_and_distortion_that_are_added_to_a_log_are_found() -> None:
     odd = dataclasses.replace(
         exact, pressures=exact.pressures + BIAS[:, None], positions=exact.positions + bent(exact.positions)
     )
-    found, theta = [], coordinates(TRUE, QUANTITIES)
+    found, theta = [], coordinates(TRUE, FREE_PARAMETERS)
     for log in (exact, odd):
-        problem = Problem(cut(log, TRUE), guessed_noise(exact), TRUE, QUANTITIES, lambda: None)
+        problem = Problem(cut(log, TRUE), guessed_noise(exact), TRUE, FREE_PARAMETERS, lambda: None)
         problem.settled(theta)
         shown, corrected = problem.windows, problem.offsets.corrected()
         bias = (shown.pressures - corrected.pressures)[0, 0]

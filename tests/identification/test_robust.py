@@ -11,14 +11,17 @@ from baselines.identification import estimate, starts
 from baselines.identification.budget import Budget
 from baselines.identification.estimate import Fit, Problem, search
 from baselines.identification.force_offset import force_offset
+from baselines.identification.free_parameters import FREE_PARAMETERS, coordinates
 from baselines.identification.noise import guessed_noise
-from baselines.identification.quantities import QUANTITIES, coordinates, value_of
 from baselines.identification.trial import Trial
 from baselines.identification.windows import cut
+from birthsim_env.physics.rig.parameters import value_of
 from tests.identification.broken import scattered
 from tests.identification.trials import OWNER, TRUE, part, trial
 
-SOME = tuple(one for one in QUANTITIES if one.name in ("mechanics.mass", "valves.sonic_conductance", "valves.time_constant"))
+SOME = tuple(
+    one for one in FREE_PARAMETERS if one.name in ("mechanics.mass", "valves.sonic_conductance", "valves.time_constant")
+)
 KNOWN = TRUE.replace({one.name: value_of(OWNER, one.name) for one in SOME})
 CHOSEN = np.arange(3, 22, 4)
 

@@ -166,11 +166,11 @@ def linearize(
     level = p[[at.FS1, at.FS2] if has_bristle else [at.FC1, at.FC2], 0]
     if friction == "sliding":
         # A bristle that neither moves nor damps holds dry friction where it is.
-        p[at.LUGRE], p[at.ELASTO_PLASTIC], p[at.BRISTLE_S1] = 1.0, 0.0, 0.0
+        p[at.LUGRE], p[at.ELASTO_PLASTIC], p[at.S1] = 1.0, 0.0, 0.0
     kept[[at.Z1, at.Z2]] = friction == "stuck" and has_bristle
     load = geometry.joint_force([f[0], f[1] - p[at.MASS, 0] * p[at.GRAVITY, 0]], piston, rig)
     leans = friction == "sliding" or has_bristle
-    x[[at.Z1, at.Z2]] = _left_over(x, load, p, level) / p[at.BRISTLE_S0, 0] if leans else 0.0
+    x[[at.Z1, at.Z2]] = _left_over(x, load, p, level) / p[at.S0, 0] if leans else 0.0
     names = STATES
     if kept[at.STATES :].any():
         x, names = np.concatenate([x, _further(x, f, p)]), STATES + FURTHER

@@ -1,7 +1,6 @@
-"""Domain randomisation of the rig: uniform draws from the ranges that the parameter fields document."""
+"""Domain randomisation of the rig: uniform draws from the ranges that parameters are declared with."""
 
 import copy
-import dataclasses
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -12,50 +11,44 @@ from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
-from birthsim_env.physics.rig.parameters import Parameters, field_of, least_dead_volume
+from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, least_dead_volume, parameter_of
 from birthsim_env.physics.rig.values import is_finite, shown
 
 Ranges = Mapping[str, tuple[float, float]]
 
 RANDOMIZE = (False, True, "plant", "scenario", "sensors")
 """Words of the environments' argument ``randomize``. With ``"sensors"`` the rig is the one described, and what a law believes
-about its sensors is wrong: their figures are drawn, and the scenario varies."""
+about its sensors is wrong: their parameters are drawn, and the scenario varies."""
 
-SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed")
-"""Sections and fields in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal rig,
-and sensors too where their model does not draw them (``sensors.drawn_by``)."""
+_WHOLE = tuple(name for name, part in SECTIONS.items() if all(one.shared for one in part.parameters.values()))
+SHARED = (*_WHOLE, *(name for name, one in DECLARED.items() if one.shared and name.partition(".")[0] not in _WHOLE))
+"""Sections and parameters in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal
+rig, and sensors too where their model does not draw them (``sensors.drawn_by``)."""
 
 
 _DRAWN_BY_SOME = tuple(name for sensors in SENSORS for name in drawn_by(sensors))
-
-WORST_AT_LEAST = ("mechanics.mass", "friction.sign_speed", "chambers.dead_volume", "air.supply_pressure")
-"""Fields whose least values are the hardest on a rig; of all others, the largest are."""
 
 BORES = ("cylinder1.piston_diameter", "cylinder2.piston_diameter")
 """Wide ones ask for dead volume, narrow ones for thin rods."""
 
 KNOWN = 0.2
-"""Share of a figure by which it may be off where a rig's owner has described it; assumed."""
+"""Share of a parameter by which it may be off where a rig's owner has described it; assumed."""
 
 
 def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
     """Dotted field name -> (low, high), SI units: what domain randomisation of a rig with a sensor model draws from.
 
-    A figure of the default rig is assumed, and has the range that its field documents; one that the owner
+    A parameter of the default rig is assumed, and has the range that it is declared with; one that the owner
     has given another value is known to ``KNOWN``. Where the rig has ``ranges`` of its own, those count.
     """
     ranges = {}
-    for section in dataclasses.fields(Parameters):
-        for field in dataclasses.fields(section.default) if section.name != "ranges" else ():  # type: ignore[arg-type]
-            if field.metadata["randomized"]:
-                value = getattr(getattr(nominal, section.name), field.name)
-                low, high = field.metadata["randomized"]
-                if value != getattr(section.default, field.name):
-                    low, high = (
-                        max((1 - KNOWN) * value, field.metadata["least"]),
-                        min((1 + KNOWN) * value, field.metadata["most"]),
-                    )
-                ranges[f"{section.name}.{field.name}"] = (low, high)
+    for dotted, one in DECLARED.items():
+        if one.range and not one.on_request:
+            section, _, name = dotted.partition(".")
+            value, low, high = getattr(getattr(nominal, section), name), *one.range
+            if value != getattr(SECTIONS[section], name):
+                low, high = max((1 - KNOWN) * value, one.least), min((1 + KNOWN) * value, one.most)
+            ranges[dotted] = (low, high)
     volume = "chambers.dead_volume"
     ranges[volume] = (max(ranges[volume][0], least_dead_volume(nominal)), ranges[volume][1])
     ranges.update({name: (low, high) for name, low, high in nominal.ranges})
@@ -79,7 +72,7 @@ def described(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> st
     for name, (low, high) in randomize.items():
         section, _, own = name.partition(".")
         words = f"{own} of {section}" if section.startswith("cylinder") else own
-        unit = field_of(name).metadata["unit"].removeprefix("-")
+        unit = parameter_of(name).unit.removeprefix("-")
         named.append(f"{words.replace('_', ' ')} {low:.4g} to {high:.4g} {unit}".rstrip())
     drawn = "rigs" if set(randomize) - set(drawn_by(sensors)) else "sensors"
     return f"{drawn} drawn: {', '.join(named)}" if named else "the rig as described"
@@ -95,7 +88,7 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
     for name, bounds in ranges.items():
         if not isinstance(name, str):
             raise ValueError(f"randomize[{shown(name)}]; allowed: dotted names of parameters such as 'mechanics.mass'")
-        if field_of(name).metadata["choices"]:
+        if parameter_of(name).choices:
             raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
         if name not in drawn_by(sensors) and (name.partition(".")[0] in SHARED or name in SHARED):
             more = f"; with other sensors {name}" if name in _DRAWN_BY_SOME else ""
@@ -111,8 +104,8 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
         nominal.replace({name: high})
     # Whatever is checked of several fields together grows or falls with each: two rigs are the worst of all that can be drawn.
     for thinnest in (False, True):
-        least = (*WORST_AT_LEAST, *BORES) if thinnest else WORST_AT_LEAST
-        worst = {name: low if name in least else high for name, (low, high) in checked.items()}
+        at_least = {name for name in checked if DECLARED[name].hardest_low or (thinnest and name in BORES)}
+        worst = {name: low if name in at_least else high for name, (low, high) in checked.items()}
         try:
             nominal.replace(worst)
         except ValueError as error:

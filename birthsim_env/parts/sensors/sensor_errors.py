@@ -4,7 +4,6 @@ The tracker's distortion is a sum of ``WAVES`` plane waves per axis whose direct
 value where the tracker was registered: smooth, with the wavelength ``distortion_length`` and the given RMS over phases.
 """
 
-import dataclasses
 import math
 from typing import Any
 
@@ -17,11 +16,11 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.electronics import Electronics
 
-_DRAWN = [field for field in dataclasses.fields(Electronics) if field.metadata["randomized"] or field.metadata["worth"]]
-FIGURES = tuple(field.name for field in _DRAWN)
+_DRAWN = {name: one for name, one in Electronics.parameters.items() if one.range}
+FIGURES = tuple(_DRAWN)
 """Figures in which lanes may differ, in the order of their fields."""
 
-Figures: Any = type("Figures", (Rows,), {field.name: row(field.metadata["unit"], field.name) for field in _DRAWN})
+Figures: Any = type("Figures", (Rows,), {name: row(one.unit, one.about) for name, one in _DRAWN.items()})
 """``FIGURES`` as rows."""
 
 WAVES = 3

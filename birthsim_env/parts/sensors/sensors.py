@@ -7,7 +7,7 @@ A sensor model's ``measure`` is called whenever somebody looks: at every control
 every policy period.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -70,8 +70,8 @@ class LabSensors(BoardSensors):
     """
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
-        options = [one for one in fields(electronics) if one.metadata["option"] and one.metadata["least"] == 0]
-        no_errors: dict[str, Any] = {one.name: 0.0 for one in options if one.name not in ACCELEROMETER}
+        errors = [name for name, one in electronics.parameters.items() if one.option and one.least == 0]
+        no_errors: dict[str, Any] = {name: 0.0 for name in errors if name not in ACCELEROMETER}
         super().__init__(replace(electronics, **no_errors), num_envs)
 
 

@@ -7,24 +7,36 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import tomli_w
 
 from birthsim_env.files import write_text
 from birthsim_env.physics.electronics import Electronics
+from birthsim_env.physics.rig.declaration import Parameter, Section, derived
+from birthsim_env.physics.rig.mechanical import Cylinder, Friction, Geometry, Mechanics
+from birthsim_env.physics.rig.pneumatic import Air, Chambers, Valves
 from birthsim_env.physics.rig.reading import read_toml
-from birthsim_env.physics.rig.sections import Air, Chambers, Cylinder, Friction, Geometry, Mechanics, Valves
 from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
 
 __all__ = [
-    "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters", "Valves", "field_of",
-    "follow", "least_dead_volume", "load_parameters",
+    "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters",
+    "Valves", "follow", "least_dead_volume", "load_parameters", "parameter_of", "value_of",
 ]  # fmt: skip
 
 STOP_DEPTH = 0.01
 """m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
 
+SHORTEST_TUBE = 0.05
+"""m. A shorter tube has the lag of one of this length, 0.15 ms, which steps of 0.25 ms follow."""
+
 FASTEST_RATE = 7000.0
 """1/s. Runge-Kutta steps of 0.25 ms are stable up to 11000; the spring of the bristles takes its share."""
+
+
+def _tube_rate(rig: Any) -> Any:
+    air, length = rig.air, rig.chambers.tube_length
+    sound = np.sqrt(air.heat_capacity_ratio * air.gas_constant * air.temperature)
+    return np.where(np.greater(length, 0.0), sound / np.maximum(length, SHORTEST_TUBE), 0.0)
 
 
 @dataclass(frozen=True)
@@ -84,13 +96,14 @@ class Parameters:
     electronics: Electronics = Electronics()
     ranges: tuple[tuple[str, float, float], ...] = ()
 
+    fs1 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder1.coulomb_friction)
+    fs2 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder2.coulomb_friction)
+    tube_rate = derived("1/s", "c/L of the tubes", _tube_rate)
+
     def __post_init__(self) -> None:
-        for field in _parts(type(self)):
-            expected = type(field.default)
-            if not isinstance(getattr(self, field.name), expected):
-                raise ValueError(
-                    f"{field.name} = {shown(getattr(self, field.name))}; allowed: an instance of {expected.__name__}"
-                )
+        for name, part in SECTIONS.items():
+            if not isinstance(getattr(self, name), type(part)):
+                raise ValueError(f"{name} = {shown(getattr(self, name))}; allowed: an instance of {type(part).__name__}")
         self._check_linkage()
         self._check_dead_volume()
         self._check_stability()
@@ -135,14 +148,14 @@ class Parameters:
     def replace(self, changes: dict[str, Any]) -> Self:
         """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``.
 
-        Three figures depend on bores and strokes, and follow where ``changes`` do not name them. The dead volume grows with the
-        largest piston, the linkage with a stroke of cylinder 1 that it has no room for, and k2 with a longer cylinder 2.
+        Three parameters depend on bores and strokes, and follow where ``changes`` do not name them. The dead volume grows with
+        the largest piston, the linkage with a stroke of cylinder 1 that it has no room for, and k2 with a longer cylinder 2.
         """
         if not isinstance(changes, Mapping):
             raise ValueError(f"changes = {shown(changes)}; allowed: a mapping such as {{'mechanics.mass': 4.0}}")
         grouped: dict[str, dict[str, Any]] = {}
         for dotted, value in changes.items():
-            field_of(dotted)
+            parameter_of(dotted)
             section, _, name = dotted.partition(".")
             grouped.setdefault(section, {})[name] = value
         parts = {section: dataclasses.replace(getattr(self, section), **values) for section, values in grouped.items()}
@@ -152,9 +165,9 @@ class Parameters:
     def to_dict(self, options: bool = False) -> dict[str, dict[str, Any]]:
         """All values as ``{section: {field: value}}``, and ``{"randomize": {name: [low, high]}}`` where there are ranges.
 
-        Without ``options`` these (``quantities.quantity``) are named only where they differ from their defaults.
+        Without ``options`` these (``declaration.Parameter``) are named only where they differ from their defaults.
         """
-        sections = {field.name: getattr(self, field.name).to_dict(options) for field in _parts(type(self))}
+        sections = {name: getattr(self, name).to_dict(options) for name in SECTIONS}
         return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
     @classmethod
@@ -166,7 +179,7 @@ class Parameters:
                 changes[section] = values
             elif not isinstance(values, dict):
                 raise ValueError(
-                    f"{in_line(section)} = {shown(values)}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}"
+                    f"{in_line(section)} = {shown(values)}; allowed: a section, one of {', '.join(SECTIONS)}, {RANDOMIZE}"
                 )
             elif section != RANDOMIZE:
                 changes.update({f"{section}.{name}": value for name, value in values.items()})
@@ -186,10 +199,6 @@ class Parameters:
             raise ValueError(f"parameters = {str(path)!r}: {error}") from error
 
 
-def _parts(rig: type[Parameters]) -> list[dataclasses.Field[Any]]:
-    return [field for field in dataclasses.fields(rig) if field.name != "ranges"]
-
-
 def _own_ranges(table: dict[str, Any]) -> tuple[tuple[str, float, float], ...]:
     """The table ``[randomize]`` of a file; names and limits are checked where they are drawn from."""
     found = []
@@ -197,7 +206,7 @@ def _own_ranges(table: dict[str, Any]) -> tuple[tuple[str, float, float], ...]:
         if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
             words = f"[{RANDOMIZE}] {in_line(name)} = {shown(bounds)}"
             raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
-        field_of(name)
+        parameter_of(name)
         found.append((name, float(bounds[0]), float(bounds[1])))
     return tuple(sorted(found))
 
@@ -229,7 +238,11 @@ def follow(parts: dict[str, Any], rig: Parameters, changes: dict[str, Any]) -> N
 RANDOMIZE = "randomize"
 """The table of a file that holds an owner's own ranges."""
 
-_SECTIONS = {field.name: field.default for field in _parts(Parameters)}
+SECTIONS: dict[str, Section] = {one.name: one.default for one in dataclasses.fields(Parameters) if one.name != "ranges"}  # type: ignore[misc]
+"""Name of a section -> what it is in ``Parameters()``."""
+
+DECLARED = {f"{section}.{name}": one for section, part in SECTIONS.items() for name, one in part.parameters.items()}
+"""Dotted name of a parameter -> what is declared of it, in the order of the sections."""
 
 
 def least_dead_volume(rig: Parameters) -> float:
@@ -237,17 +250,24 @@ def least_dead_volume(rig: Parameters) -> float:
     return STOP_DEPTH * max(rig.cylinder1.area_p, rig.cylinder2.area_p)
 
 
-def field_of(dotted: str) -> dataclasses.Field[Any]:
-    """The field behind a dotted name such as ``"mechanics.mass"``; ``ValueError`` names the alternatives."""
+def parameter_of(dotted: str) -> Parameter:
+    """What is declared of a dotted name such as ``"mechanics.mass"``; ``ValueError`` names the alternatives."""
     section, _, name = dotted.partition(".") if isinstance(dotted, str) else (dotted, "", "")
-    if section not in _SECTIONS:
-        like = [f"{one}.{dotted}" for one, part in _SECTIONS.items() if isinstance(dotted, str) and hasattr(part, dotted)]
-        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else near(str(section), _SECTIONS)
-        raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(_SECTIONS)}")
-    fields = {field.name: field for field in dataclasses.fields(_SECTIONS[section])}  # type: ignore[arg-type]
-    if name not in fields:
-        raise ValueError(f"unknown parameter {shown(dotted)}{near(name, fields)}; allowed in {section}: {', '.join(fields)}")
-    return fields[name]
+    if section not in SECTIONS:
+        like = [f"{one}.{dotted}" for one, part in SECTIONS.items() if dotted in part.parameters]
+        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else near(str(section), SECTIONS)
+        raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(SECTIONS)}")
+    known = SECTIONS[section].parameters
+    if name not in known:
+        raise ValueError(f"unknown parameter {shown(dotted)}{near(name, known)}; allowed in {section}: {', '.join(known)}")
+    return known[name]
+
+
+def value_of(rig: Parameters, dotted: str) -> Any:
+    """The value of a dotted name."""
+    section, _, name = dotted.partition(".")
+    value = getattr(getattr(rig, section), name)
+    return value if isinstance(value, str) else float(value)
 
 
 def load_parameters(parameters: Parameters | Mapping[str, Any] | str | os.PathLike[str] | None) -> Parameters:

@@ -3,7 +3,7 @@
 It is the oracle of the plant: tests compare both, and ``accuracy`` measures the plant's error against it. State (18): end
 effector x, y, vx, vy; air masses (4) and internal energies (4) of chambers P1, N1, P2, N2; bristles z1, z2; spools (4). Rod
 forces act between points, chambers obey conservation of mass and energy, and nothing of the package is imported but the data of
-a rig. End stops are left out.
+a rig.
 """
 
 from collections.abc import Callable
@@ -18,6 +18,14 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 Array = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
+
+LEFT_OUT = {
+    "mechanics.stop_stiffness": "no motion that is compared meets an end stop",
+    "mechanics.stop_damping": "no motion that is compared meets an end stop",
+    "chambers.tube_length": "an option, compared with a model of its own in tests/physics/plant/test_options.py",
+    "chambers.tube_diameter": "an option, compared with a model of its own in tests/physics/plant/test_options.py",
+}
+"""Parameters that ``dynamics`` computes with and this model does not, and why not."""
 
 SCALES = np.array([0.1, 0.1, 0.1, 0.1, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1.0] * 4])
 """Size of each state: the solver sees multiples of it, so that one absolute tolerance serves all."""

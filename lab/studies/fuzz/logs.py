@@ -42,12 +42,15 @@ def _log(_: Path) -> Trial:
 
 def _fitted(log: Trial) -> None:
     from baselines.identification.estimate import Problem, search
+    from baselines.identification.free_parameters import FREE_PARAMETERS
     from baselines.identification.noise import guessed_noise
-    from baselines.identification.quantities import QUANTITIES
     from baselines.identification.windows import cut
     from birthsim_env.physics.rig.parameters import Parameters
 
-    rig, some = Parameters(), tuple(one for one in QUANTITIES if one.name in ("mechanics.mass", "valves.sonic_conductance"))
+    rig, some = (
+        Parameters(),
+        tuple(one for one in FREE_PARAMETERS if one.name in ("mechanics.mass", "valves.sonic_conductance")),
+    )
     windows = cut(log, rig, 0.05)
     chosen = np.unique(np.linspace(0, len(windows.starts) - 1, 3).astype(np.intp))
     problem = Problem(windows.some(chosen), guessed_noise(log), rig, some, lambda: None)

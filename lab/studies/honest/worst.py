@@ -9,7 +9,6 @@ import numpy as np
 from baselines.bench.evaluation import Evaluation, evaluate_worlds
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
-from baselines.identification.quantities import value_of
 from baselines.registry import make_controller, uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
@@ -18,7 +17,7 @@ from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, load_parameters, value_of
 from birthsim_env.physics.rig.values import checked_number
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
@@ -97,7 +96,7 @@ def causes(
     world, push, way = _world(placed({}), sensors, seed)
     ranges = documented_ranges(rig, sensors)
     drawn = {figure: value_of(rig, figure) for figure, (low, high) in ranges.items() if low < high}
-    errors = [figure for figure in ranges if figure in drawn_by(sensors) and field_of(figure).metadata["least"] == 0.0]
+    errors = [figure for figure in ranges if figure in drawn_by(sensors) and DECLARED[figure].least == 0.0]
     put = [*drawn.items(), *((figure, 0.0) for figure in errors)]
     rows = sorted((size({figure: value}), figure, world[figure], value) for figure, value in put)[:CAUSES]
     here = _evaluated(controller, rest, placed({}), sensors, [seed])

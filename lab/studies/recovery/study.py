@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.statistics import quantile
-from baselines.identification.quantities import QUANTITIES, value_of
+from baselines.identification.free_parameters import FREE_PARAMETERS
 from baselines.work.tasks import Task
 from birthsim_env.parts.drawn.randomization import Ranges
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 from lab.studies.recovery.tasks import EXPERIMENTS, RANGES, recovery_tasks
 from lab.studies.results import Content
 from lab.studies.study import Found, Options, Study
@@ -44,17 +44,17 @@ def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> li
         "| true value inside |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for one in QUANTITIES:
+    for one in FREE_PARAMETERS:
         rows = [result["rows"][one.name] for result in results]
         told = [row for row in rows if row["told"]]
         low, high = ranges.get(one.name, 2 * [value_of(Parameters(), one.name)])
-        scale, unit, digits = (1e3, "ms", 2) if one.unit else (100.0, "%", 2)
-        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.unit else row["true"]) for row in told]
-        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.unit else row["true"]) for row in told]
+        scale, unit, digits = (1e3, "ms", 2) if one.prior.scale else (100.0, "%", 2)
+        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.prior.scale else row["true"]) for row in told]
+        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.prior.scale else row["true"]) for row in told]
         cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
         inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
         written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)
-        drawn = f"{f'{low:g} to ' if low < high else ''}{high:g} {field_of(one.name).metadata['unit']}"
+        drawn = f"{f'{low:g} to ' if low < high else ''}{high:g} {DECLARED[one.name].unit}"
         lines.append(f"| `{one.name}` | {drawn} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
     return lines
 

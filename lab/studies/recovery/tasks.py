@@ -9,15 +9,15 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.identification.experiment import Plan, propose
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.quantities import value_of
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.drawn.randomization import draw_parameters
+from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import Parameters, value_of
 
+_DOCUMENTED = documented_ranges(Parameters(), "honest")
 RANGES: dict[str, tuple[float, float]] = {
     **{
-        name: field_of(name).metadata["randomized"]
+        name: _DOCUMENTED[name]
         for name in (
             "cylinder1.coulomb_friction", "cylinder1.viscous_friction", "cylinder2.coulomb_friction",
             "cylinder2.viscous_friction", "mechanics.mass", "chambers.dead_volume", "chambers.wall_heat_transfer",

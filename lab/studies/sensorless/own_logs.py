@@ -8,11 +8,10 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.identification.experiment import propose
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from baselines.staged import StagedController
 from baselines.work.tasks import Result
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, value_of
 from lab.studies.comparison.grid import as_described
 from lab.studies.haptics.worlds import Condition
 from lab.studies.sensorless.measures import felt

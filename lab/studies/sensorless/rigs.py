@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 from lab.studies.comparison.grid import as_described
 
 OFF = 0.05
@@ -24,9 +24,8 @@ def believed(rig: Parameters, plant: str) -> Parameters:
 
 def around(rig: Parameters, name: str, off: float) -> tuple[float, float]:
     """The range of the figure ``name`` within a fraction ``off`` of the rig's, in what is allowed of it."""
-    section, _, own = name.partition(".")
-    value, limits = getattr(getattr(rig, section), own), field_of(name).metadata
-    return max(limits["least"], (1 - off) * value), min(limits["most"], (1 + off) * value)
+    value, declared = value_of(rig, name), DECLARED[name]
+    return max(declared.least, (1 - off) * value), min(declared.most, (1 + off) * value)
 
 
 def _with(rig: Parameters, ranges: Mapping[str, tuple[float, float]]) -> Parameters:

@@ -14,6 +14,9 @@ OPTIMISED = ("-O3", "-march=native", "-ffast-math")
 PLAIN = ("-O3", "-march=native")
 """Options of gcc: as fast as it can, and with every operation as written (but for fused products and sums)."""
 
+LEFT_OUT: dict[str, str] = {}
+"""Parameters that ``dynamics`` computes with and the twin does not, and why not."""
+
 
 def has_compiler() -> bool:
     """Whether gcc is there."""

@@ -10,7 +10,6 @@ from baselines.bench.resting import RestingRigs
 from baselines.identification.experiment import propose
 from baselines.identification.identified import MISFIT, identify
 from baselines.identification.laboratory import PNEUMATIC, STIFFNESS, run_plan
-from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Reference
@@ -19,7 +18,7 @@ from birthsim_env.parts.points import Through
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, value_of
 from lab.studies.recovery.tasks import SENSORS, drawn_rig
 from lab.studies.strangers.model import Strangeness, Stranger
 

@@ -13,7 +13,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number
 from baselines.figures.style import COLUMN, LOST, PAGE, STYLE, headline, label_of, legend_below, log_ticks, save
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import field_of
+from birthsim_env.physics.rig.parameters import DECLARED
 from lab.studies.sweeps.plan import HeatMap
 from lab.studies.sweeps.report import as_float, short
 
@@ -86,8 +86,4 @@ def _places(values: Sequence[Any]) -> tuple[Array, list[str]]:
 def _label(name: str) -> str:
     """A name with its unit, where it is a parameter of the rig."""
     group, _, rest = name.partition(".")
-    return (
-        f"{rest.replace('_', ' ').replace('.', ': ')} ({field_of(rest).metadata['unit']})"
-        if group in ("rig", "believed")
-        else name
-    )
+    return f"{rest.replace('_', ' ').replace('.', ': ')} ({DECLARED[rest].unit})" if group in ("rig", "believed") else name

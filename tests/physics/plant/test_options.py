@@ -1,6 +1,5 @@
 """Options of the plant: against the second model with a reservoir and a second body, closed forms, the plain plant."""
 
-import dataclasses
 import math
 import re
 from pathlib import Path
@@ -14,7 +13,7 @@ from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ra
 from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 from lab.studies.accuracy import second_model
 from lab.studies.accuracy.motions import PERIOD, strong
 from lab.studies.accuracy.second_model import SCALES, SecondModel
@@ -24,13 +23,7 @@ LINE = {"air.supply_conductance": 4e-9, "air.supply_volume": 1e-4}
 TUBE = {"chambers.tube_length": 1.0}
 HANDLE = {"mechanics.mode_frequency": 25.0, "mechanics.mode_damping": 0.05, "mechanics.mode_mass_fraction": 0.3}
 EACH = {"line": LINE, "tube": TUBE, "handle": HANDLE, "all": {**LINE, **TUBE, **HANDLE}}
-WORTH = {
-    f"{section.name}.{field.name}": field.metadata["worth"]
-    for section in dataclasses.fields(Parameters)
-    if section.name != "ranges"
-    for field in dataclasses.fields(section.default)
-    if field.metadata["worth"]
-}
+WORTH = {name: one.range for name, one in DECLARED.items() if one.on_request}
 
 
 class OtherOptions:
@@ -219,4 +212,4 @@ def test_the_page_has_every_option_with_its_default_and_its_range():
     rows = re.findall(r"^\|[^|]*\| `([\w.]+)` \| ([^| ]+)[^|]*\| (\S+) to (\S+) \|", page, re.MULTILINE)
     assert {name: (float(low), float(high)) for name, _, low, high in rows} == WORTH
     for name, default, *_ in rows:
-        assert float(default) == field_of(name).default, name
+        assert float(default) == DECLARED[name].default, name

@@ -1,6 +1,5 @@
-"""Parameters: every figure has unit, basis and limits; impossible rigs are refused by name; TOML files come back equal."""
+"""Parameters: every parameter has unit, source and limits; impossible rigs are refused by name; TOML files come back equal."""
 
-import dataclasses
 import math
 import re
 from pathlib import Path
@@ -12,51 +11,31 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
-from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
+from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, load_parameters, parameter_of, value_of
 from tests.physics.rigs import LAWS
-
-FIELDS = [
-    (section.name, field)
-    for section in dataclasses.fields(Parameters)[:-1]
-    for field in dataclasses.fields(type(section.default))
-]
-
-DESIGN_RANGES = {
-    "mechanics.mass": (2, 5),
-    "cylinder1.coulomb_friction": (6, 25),
-    "cylinder2.coulomb_friction": (6, 25),
-    "cylinder1.viscous_friction": (10, 60),
-    "cylinder2.viscous_friction": (10, 60),
-    "chambers.dead_volume": (5e-6, 25e-6),
-    "chambers.wall_heat_transfer": (20, 100),
-    "valves.time_constant": (0.0015, 0.008),
-}
-"""Assumed: docs/reference/rig.md has them."""
-
 
 UNITS = {"m", "rad", "N", "N s/m", "kg", "m/s2", "N/m", "s/m", "m/s", "-", "m3", "W/(m2 K)", "W/K", "m3/(s Pa)", "s", "Pa", "K"}
 UNITS |= {"J/(kg K)", "kg/m3", "Hz"}
 
 
-def test_every_field_has_unit_basis_and_a_line_in_the_docstring() -> None:
-    for section, field in FIELDS:
-        name, unit, basis = f"{section}.{field.name}", field.metadata["unit"], field.metadata["basis"]
-        assert unit in UNITS, name
-        assert len(basis) >= 5, name
-        lines = (type(getattr(Parameters(), section)).__doc__ or "").splitlines()
-        found = [f"({unit};" in line and basis in line for line in lines if line.startswith(f"- ``{field.name}``")]
-        assert found == [True], name
-        assert field_of(name).metadata == field.metadata
+def test_every_parameter_has_unit_meaning_source_and_a_line_in_the_docstring() -> None:
+    for dotted, one in DECLARED.items():
+        section, _, name = dotted.partition(".")
+        assert one.unit in UNITS, dotted
+        assert min(len(one.about), len(one.source)) >= 4, dotted
+        lines = (SECTIONS[section].__doc__ or "").splitlines()
+        found = [f"({one.unit}): {one.about}; {one.source}" in line for line in lines if line.startswith(f"- ``{name}``")]
+        assert found == [True], dotted
+        assert parameter_of(dotted) is one
 
 
-def test_ranges_of_randomisation_are_those_of_the_design_and_possible() -> None:
-    ranges = {f"{s}.{f.name}": f.metadata["randomized"] for s, f in FIELDS if f.metadata["randomized"]}
-    # Those of sensors stand on a page, which the tests of ``honest`` compare.
-    assert {name: ends for name, ends in ranges.items() if not name.startswith("electronics.")} == DESIGN_RANGES
-    for name, ends in ranges.items():
-        for end in ends:
-            section, field = name.split(".")
-            assert getattr(getattr(Parameters().replace({name: float(end)}), section), field) == end
+def test_ranges_are_ordered_and_possible() -> None:
+    ranges = {name: one.range for name, one in DECLARED.items() if one.range}
+    assert ranges["mechanics.mass"] == (2, 5)
+    for name, (low, high) in ranges.items():
+        assert low < high, name
+        for end in (low, high):
+            assert value_of(Parameters().replace({name: float(end)}), name) == end
 
 
 def test_figures_of_table_1() -> None:
@@ -70,13 +49,13 @@ def test_figures_of_table_1() -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "wide", None, True, [1.0]], ids=str)
 def test_what_is_no_number_is_refused_by_the_name_of_every_field(value: Any) -> None:
-    for section, field in FIELDS:
-        part = type(getattr(Parameters(), section)).__name__
-        message = f"{part}.{field.name} = {value!r} is impossible; allowed: "
+    for dotted, one in DECLARED.items():
+        section, _, name = dotted.partition(".")
+        message = f"{type(SECTIONS[section]).__name__}.{name} = {value!r} is impossible; allowed: "
         with pytest.raises(ValueError, match="^" + re.escape(message)) as error:
-            Parameters().replace({f"{section}.{field.name}": value})
-        if not field.metadata["choices"]:
-            assert f"({field.metadata['unit']})" in str(error.value)
+            Parameters().replace({dotted: value})
+        if not one.choices:
+            assert f"({one.unit})" in str(error.value)
 
 
 @settings(max_examples=25)
