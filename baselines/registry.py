@@ -23,7 +23,7 @@ LIMITED = "limited:"
 GUARDING = ("on_fault", "fault_time")
 """Options of every compiled controller: what happens where a sensor says nothing finite, see ``StagedController.protect``."""
 
-OWN_FILE = ", or path/to/file.py:Name"
+OWN_FILE = ", or path/to/file.py:Class"
 
 
 def compiled_names(listed: bool | None = None) -> list[str]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import find_spec
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -39,6 +40,9 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "study": ("lab.studies",),
 }  # fmt: skip
 """Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""
+
+ROOT = Path(__file__).resolve().parents[1]
+"""Where BirthSIM's packages stand side by side."""
 
 PLUGINS = "birthsim.plugins"
 """Entry point group of other distributions' modules."""
@@ -69,6 +73,8 @@ class Entry:
         What takes its place; "" where it stays.
     order : int
         Where lists show it; equal ones stand in alphabetical order.
+    module : str
+        Where it is registered.
     """
 
     kind: str
@@ -80,15 +86,10 @@ class Entry:
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     deprecated: str = ""
     order: int = LAST
-
-    @property
-    def module(self) -> str:
-        """The module in which it is registered."""
-        return _WHERE[self.kind, self.name]
+    module: str = ""
 
 
 _ENTRIES: dict[str, dict[str, Entry]] = {kind: {} for kind in ROOMS}
-_WHERE: dict[tuple[str, str], str] = {}
 _ENTERED: set[str] = set()
 _BROKEN: dict[str, str] = {}
 _ENTERING = threading.RLock()
@@ -132,12 +133,12 @@ def register(
     Raises
     ------
     ValueError
-        For no kind of ``ROOMS``, more than one, or a name that is taken.
+        For no kind of ``ROOMS``, more than one, or a name that is taken, or ``needs`` that are one text.
 
     Notes
     -----
     The module must be imported before the name is used. Another distribution names it in an entry point of the group
-    ``birthsim.plugins``.
+    ``birthsim.plugins``. A file that is given by its path registers nothing: a user types the path.
 
     Examples
     --------
@@ -155,16 +156,19 @@ def register(
     """
     if len(named) != 1 or not set(named) <= set(ROOMS):
         raise ValueError(f"register({', '.join(named)}); allowed: one of {', '.join(ROOMS)}")
+    if isinstance(needs, str):
+        raise ValueError(f"needs = {shown(needs)}; allowed: a set, as {{{shown(needs)}}}")
     ((kind, name),) = named.items()
 
     def keep(made: T) -> T:
         where, there = str(sys._getframe(1).f_globals["__name__"]), _ENTRIES[kind].get(name)
+        if not all(part.isidentifier() for part in where.split(".")):
+            return made  # in a file that is given by its path, which is what a user types
         # A module that is loaded again makes its classes anew, and registers these.
-        if there is not None and (_WHERE[kind, name] != where or there.made is made or _called(there.made) != _called(made)):
-            raise ValueError(f"{kind} = {shown(name)} is registered by {_WHERE[kind, name]}; allowed in {where}: another name")
+        if there is not None and (there.module != where or there.made is made or _called(there.made) != _called(made)):
+            raise ValueError(f"{kind} = {shown(name)} is registered by {there.module}; allowed in {where}: another name")
         preset = MappingProxyType(dict(options or {}))
-        _WHERE[kind, name] = where
-        _ENTRIES[kind][name] = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order)
+        _ENTRIES[kind][name] = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order, where)
         return made
 
     return keep
@@ -188,8 +192,8 @@ def _enter(kind: str) -> None:
             _ENTERED.discard(kind)
             raise
         for point in entry_points(group=PLUGINS):
-            if point.value not in _ENTERED:
-                _ENTERED.add(point.value)
+            if (plugin := f"{PLUGINS}: {point.value}") not in _ENTERED:
+                _ENTERED.add(plugin)
                 try:
                     point.load()
                 except Exception as error:
@@ -198,8 +202,13 @@ def _enter(kind: str) -> None:
 
 
 def _enter_room(room: str) -> None:
-    """Import a room's modules, where it is installed."""
-    if find_spec(room.partition(".")[0]) is None or find_spec(room) is None:
+    """Import a room's modules, where it is installed and no package of another owner stands in its place."""
+    top = room.partition(".")[0]
+    found = find_spec(top)
+    places = [] if found is None else [Path(one) for one in found.submodule_search_locations or ()]
+    if places and ROOT / top not in places:
+        _BROKEN[top] = f"the package at {places[0]} is not BirthSIM's"
+    if ROOT / top not in places or find_spec(room) is None:
         return
     package = import_module(room)
     for module in pkgutil.walk_packages(getattr(package, "__path__", []), f"{room}."):
@@ -254,5 +263,5 @@ def entry(kind: str, name: str, more: str = "") -> Entry:
     known = names(kind)
     asked = near(name, known) if isinstance(name, str) else ""
     allowed = "a registered name" if asked else ", ".join(known)
-    broken = "".join(f"; plugin {plugin!r} is left out: {why}" for plugin, why in _BROKEN.items())
+    broken = "".join(f"; {one!r} is left out: {why}" for one, why in _BROKEN.items())
     raise ValueError(f"{kind} = {shown(name)}{asked}; allowed: {allowed}{more}{broken}")

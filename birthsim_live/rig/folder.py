@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from agents.policy.shipped import loadable_names
 from baselines.controller import RESIDUAL
+from baselines.registry import make_controller
 from birthsim_build.faces.module import write_module
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 from birthsim_live.rig.words import controller_choice
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
@@ -43,34 +46,27 @@ def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[s
         return built
     from birthsim_live.rig.pack import pack  # which takes a second to load
 
-    return pack(rig, shipped_policies(), content["functions"], others)
+    return pack(rig, loadable_names(), content["functions"], others)
 
 
 def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -> None:
-    """Let a page (``Packed.content``) offer what is listed and not compiled, and what is ``asked`` for by name.
+    """Let a page (``Packed.content``) offer what is listed and not compiled or not built, and what is ``asked`` for by name.
 
     Raises ``ValueError`` for a controller that is none.
     """
-    choices = content["hello"]["choices"]
+    choices, asked = content["hello"]["choices"], list(asked)
     known = {one["name"]: one for one in choices["controller"]}
-    for name in dict.fromkeys(asked):
+    listed = [*names("controller", listed=True), *(f"{RESIDUAL}:{name}" for name in loadable_names())]
+    for name in dict.fromkeys([*listed, *asked]):
         if name not in known:
-            from baselines.registry import make_controller  # which takes a third of a second to load
-
-            make_controller(name, rig)
+            if name in asked:
+                make_controller(name, rig)
             known[name] = {**controller_choice(name), "missing": ""}
             choices["controller"].append(known[name])
     content["python"] = [name for name, one in known.items() if "missing" in one]
     for name in content["python"]:
         known[name].pop("missing")
     choices["compare"][1:] = choices["controller"]
-
-
-def shipped_policies() -> list[str]:
-    """Policies that come with the package; none without the extra that policies need."""
-    from agents.policy.shipped import loadable_names  # which takes a third of a second to load
-
-    return loadable_names()
 
 
 def write_page(folder: Path, packed: Packed, recording: Path | None = None) -> int:

@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 
 import birthsim_env
-from baselines.admittance.controller import AdmittanceController
-from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import RESIDUAL, Controller
 from baselines.registry import make_controller
-from baselines.rivals.tracking import TrackingController
 from baselines.staged import StagedController
 from birthsim_build.faces.module import Store
 from birthsim_build.image import INPUT_MEMORY, Part, function_name
@@ -49,9 +46,6 @@ WITHOUT = "only with birthsim live"
 
 LEARNED = f"{RESIDUAL}:circle_apg"
 """The controller whose network the page exchanges for one that it learns (``learning.LEARNER``)."""
-
-DAMPED = (BacksteppingController, AdmittanceController, TrackingController)
-"""Laws whose damping can be raised."""
 
 INFO = {
     "joints": "piston_position", "position": "position", "velocity": "velocity", "target": "target",
@@ -130,7 +124,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
             name: {"duration": one.duration, "path": path_of(begun(name), one.duration)} for name, one in SCENARIOS.items()
         },
         "sampled": {name: kind.sampled for name, kind in SENSORS.items()},
-        "damped": {name: isinstance(laws[name], DAMPED) for name in parts},
+        "damped": {name: "damping_factor" in laws[name].COMMAND_OPTIONS for name in parts},
         "numbers": NUMBERS,
         "header": {
             "format": FORMAT, "birthsim": birthsim_env.__version__, "rig": rig.to_dict(), "columns": list(FIELDS),

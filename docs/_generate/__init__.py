@@ -8,6 +8,7 @@ from pathlib import Path
 
 from _generate.api import api
 from _generate.commands import commands
+from _generate.controllers import controllers
 from _generate.environments import environments
 from _generate.metrics import metrics
 from _generate.page import page
@@ -21,6 +22,7 @@ PARTS = {
     "api_baselines.md": partial(api, "baselines"),
     "api_agents.md": partial(api, "agents"),
     "commands.md": commands,
+    "controllers.md": controllers,
     "environments.md": environments,
     "metrics.md": metrics,
     "page.md": page,

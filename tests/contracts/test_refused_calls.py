@@ -104,7 +104,7 @@ TABLE = {
     ("flows has shape (3, 2)", "(4, 2)"): [rates(8, 3)],
     ("'gain'", "name[gain=60,other=2]"): [lambda: make_controller("pid[gain]", RIG)],
     ("controller = 'nobody'", "backstepping, "): [lambda: make_controller("nobody[gain=3]", RIG)],
-    ("controller = 'limited:none'", ""): [lambda: make_controller("limited:none", RIG)],
+    ("controller = 'none'", "backstepping, "): [lambda: make_controller("limited:none", RIG)],
     ("duration = ", ">= 4 and <= 600 (s)"): [later(propose, RIG)(value) for value in (0.0, 3.9, 601.0, NAN)],
     ("discount = ", "0 or more and less than 1"): [later(ShiftedReward, None, 1.0)(value) for value in (-0.1, 1.0, 2.0, NAN)],
     ("informed = 'yes'", "True, False"): [residual(informed="yes")],

@@ -8,6 +8,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from birthsim_env import registry
+from birthsim_env.parts.own_parts import from_file
 from birthsim_env.registry import Entry, entries, entry, names, register, used
 
 
@@ -16,8 +17,8 @@ def rooms(monkeypatch, tmp_path):
     """A registry of its own with one kind, "hand", whose room ``hands`` stands in ``tmp_path``."""
     monkeypatch.setattr(registry, "ROOMS", {"hand": ("hands",)})
     monkeypatch.setattr(registry, "_ENTRIES", {"hand": {}})
-    for name in ("_WHERE", "_BROKEN"):
-        monkeypatch.setattr(registry, name, {})
+    monkeypatch.setattr(registry, "ROOT", tmp_path)
+    monkeypatch.setattr(registry, "_BROKEN", {})
     monkeypatch.setattr(registry, "_ENTERED", set())
     monkeypatch.setattr(registry, "entry_points", lambda group: [])
     monkeypatch.syspath_prepend(tmp_path)
@@ -54,6 +55,15 @@ def test_a_room_that_is_not_installed_is_empty(rooms):
     assert names("hand") == []
     with pytest.raises(ValueError, match=r"hand = 'push'; allowed: "):
         entry("hand", "push")
+
+
+def test_a_package_of_another_owner_is_no_room_and_is_named(rooms, monkeypatch, tmp_path):
+    monkeypatch.setattr(registry, "ROOT", tmp_path / "ours")
+    written(rooms / "hands", broken="raise RuntimeError('imported')")
+    assert names("hand") == []
+    with pytest.raises(ValueError, match=r"hand = 'push'.*'hands' is left out") as caught:
+        entry("hand", "push")
+    assert str(tmp_path / "hands") in str(caught.value)
 
 
 def test_a_room_that_fails_says_so_every_time(rooms):
@@ -94,6 +104,17 @@ def test_an_unknown_kind_is_refused(named):
         register(about="", **named)
 
 
+def test_needs_are_a_set():
+    with pytest.raises(ValueError, match="needs = 'force sensor'; allowed: a set"):
+        register(hand="push", about="Pushes.", needs="force sensor")
+
+
+def test_a_file_that_is_given_by_its_path_registers_nothing(rooms):
+    (rooms / "own.py").write_text(f"from birthsim_env.registry import register\n{one('push')}")
+    assert from_file("hand", f"{rooms}/own.py:Push").__name__ == "Push"
+    assert names("hand") == []
+
+
 def test_what_is_near_is_asked_for(rooms):
     written(rooms / "hands", first=one("pushing"), second=one("pulling"))
     with pytest.raises(ValueError, match=r"hand = 'pushin'.*'pushing'"):
@@ -112,7 +133,7 @@ def test_a_plugin_registers_and_one_that_fails_is_left_out_and_named(rooms, monk
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert entry("hand", "tickle").module == "theirs.good"
-        with pytest.raises(ValueError, match=r"hand = 'x'.*plugin 'bad'.*nothing_of_this_name"):
+        with pytest.raises(ValueError, match=r"hand = 'x'.*'bad'.*nothing_of_this_name"):
             entry("hand", "x")
 
 

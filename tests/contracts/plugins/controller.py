@@ -1,4 +1,7 @@
-"""A controller of a user's own, in Python and compiled: each axis by its own cylinder, opened in proportion to the error."""
+"""A controller of a user's own, in Python and compiled: each axis by its own cylinder, opened in proportion to the error.
+
+A file is used by its path, ``controller.py:Plain``. Where a distribution has it as a module, its entry point of the group
+``birthsim.plugins`` names the module, and the controllers are used by their names."""
 
 import numpy as np
 
@@ -6,10 +9,12 @@ from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.records import Numbers, number
+from birthsim_env.registry import register
 
 GAIN = 6.0
 
 
+@register(controller="proportional-python", about="Opens valves in proportion to the error.", needs={"force sensor"})
 class Plain:
     def __init__(self, parameters):
         pass
@@ -35,6 +40,13 @@ def push(world: int, seen: Seen, memory: int, gain: Gain, tables: int, lane: int
     return 0
 
 
+@register(controller="proportional", about="Opens valves in proportion to the error, compiled.")
 class Compiled(StagedController):
+    reads_force = False
+
+    def __init__(self, parameters=None, gain=GAIN):
+        super().__init__(parameters)
+        self.gain = gain
+
     def controller_stages(self, sampled):
-        return [ControllerStage(push, Gain.numbers(gain=GAIN), np.zeros(0))]
+        return [ControllerStage(push, Gain.numbers(gain=self.gain), np.zeros(0))]
