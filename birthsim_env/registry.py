@@ -191,7 +191,7 @@ def names(kind: str, listed: bool | None = None) -> list[str]:
     return [one.name for one in entries(kind, listed)]
 
 
-def entry(kind: str, name: str, more: str = "") -> Entry:
+def entry(kind: str, name: Any, more: str = "") -> Entry:
     """The entry of a name; ``used`` takes note of it. One that is deprecated warns of what takes its place.
 
     Raises

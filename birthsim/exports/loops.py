@@ -23,9 +23,8 @@ from birthsim_build.code.targets import TARGETS
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.registry import register
+from birthsim_env.registry import names, register
 
 OLDEST = TARGETS["ptx"].processor
 """The GPU that PTX is for, and all after it."""
@@ -121,7 +120,7 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
     if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        return list(SCENARIOS), list(SENSORS), compiled_names(listed=True), _shipped()
+        return list(SCENARIOS), names("sensors"), compiled_names(listed=True), _shipped()
     scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
     controllers = settings.controller or ([] if settings.policy else ["backstepping"])
     return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy

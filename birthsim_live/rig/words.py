@@ -37,11 +37,7 @@ CHOICES = {
         "two_valves": "Two valves a cylinder, one for each chamber: force and stiffness are free of each other.",
         "one_valve": "One 5/3 valve a cylinder: what fills one chamber empties the other.",
     },
-    "sensors": {
-        "ideal": "Every quantity is known exactly and at once.",
-        "lab": "A tracker that samples, is late and noisy, and noisy pressure cells.",
-        "honest": "Tracker, cells and force sensor with every error that data sheets name.",
-    },
+    "sensors": {model.name: model.about for model in entries("sensors")},
     "scenario": {name: scenario.about for name, scenario in SCENARIOS.items()},
 }
 """Setting -> choice -> what it is; controllers say it where they are registered."""

@@ -14,7 +14,7 @@ from baselines import evaluate, make_controller
 from baselines.staged import driving
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.registry import names
 
 PLUGINS = Path(__file__).parent / "plugins"
 PROBE = "BirthSIM/Probe-v2"
@@ -24,7 +24,7 @@ RIG = Parameters()
 @pytest.fixture(autouse=True)
 def imports(monkeypatch):
     """Plugins are imported by their names, as a user's are; what they register is gone after a test."""
-    tables = SCENARIOS, SENSORS, gymnasium.registry
+    tables = SCENARIOS, names("sensors"), gymnasium.registry
     kept = [dict(table) for table in tables]
     monkeypatch.syspath_prepend(PLUGINS)
     yield

@@ -20,12 +20,13 @@ from baselines import evaluate
 from baselines.registry import known_options, make_controller
 from birthsim_env import Measurement, Parameters, Reference
 from birthsim_env.parts.hands import contractions, moving_hands, user_forces
-from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
+from birthsim_env.parts.sensors.ideal import IdealSensors
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import checked_count, checked_number, whole_of
 from birthsim_env.registry import names
 from birthsim_env.vector_env import BirthSIMVectorEnv
+from tests.registered import registered
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -260,7 +261,7 @@ class Sensors(IdealSensors):
 
 @pytest.mark.parametrize("kind", _arrays((1,)))
 def test_sensors_of_ones_own_tell_numbers(kind, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", Sensors)
+    registered(monkeypatch, Sensors, sensors="own")
     for name, shape in (("time", (2,)), ("position", (2, 2)), ("pressures", (4, 2)), ("acceleration", (2, 2))):
         monkeypatch.setattr(Sensors, "name", name)
         monkeypatch.setattr(Sensors, "odd", _arrays(shape)[kind])

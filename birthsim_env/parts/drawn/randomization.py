@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.parts.drawn.streams import Streams
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.sensors.model import drawn_by, models_that_draw
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters, field_of, least_dead_volume
@@ -23,10 +23,7 @@ about its sensors is wrong: their figures are drawn, and the scenario varies."""
 
 SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed")
 """Sections and fields in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal rig,
-and sensors too where their model does not draw them (``sensors.drawn_by``)."""
-
-
-_DRAWN_BY_SOME = tuple(name for sensors in SENSORS for name in drawn_by(sensors))
+and sensors too where their model does not draw them (``SensorModel.drawn``)."""
 
 WORST_AT_LEAST = ("mechanics.mass", "friction.sign_speed", "chambers.dead_volume", "air.supply_pressure")
 """Fields whose least values are the hardest on a rig; of all others, the largest are."""
@@ -36,6 +33,11 @@ BORES = ("cylinder1.piston_diameter", "cylinder2.piston_diameter")
 
 KNOWN = 0.2
 """Share of a figure by which it may be off where a rig's owner has described it; assumed."""
+
+
+def _drawn_by_some() -> set[str]:
+    """Names of the parameters that one sensor model or another draws."""
+    return {name for model in models_that_draw() for name in drawn_by(model)}
 
 
 def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
@@ -59,7 +61,7 @@ def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, 
     volume = "chambers.dead_volume"
     ranges[volume] = (max(ranges[volume][0], least_dead_volume(nominal)), ranges[volume][1])
     ranges.update({name: (low, high) for name, low, high in nominal.ranges})
-    left_out = set(_DRAWN_BY_SOME) - set(drawn_by(sensors))
+    left_out = _drawn_by_some() - set(drawn_by(sensors))
     return {name: pair for name, pair in ranges.items() if name not in left_out}
 
 
@@ -98,7 +100,7 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
         if field_of(name).metadata["choices"]:
             raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
         if name not in drawn_by(sensors) and (name.partition(".")[0] in SHARED or name in SHARED):
-            more = f"; with other sensors {name}" if name in _DRAWN_BY_SOME else ""
+            more = f"; with other sensors {name}" if name in _drawn_by_some() else ""
             raise ValueError(
                 f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes{more}"
             )

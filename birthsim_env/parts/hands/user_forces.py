@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import FORCE, MOTION, TIME, Seen, World
-from birthsim_env.loop.stage import Stage, table1, table3
+from birthsim_env.loop.stage import Stage, Staged, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.parts.times import Timed, timed
@@ -31,7 +31,7 @@ MOST = 100
 """Pushes, pulls or contractions of an episode."""
 
 
-class UserForce:
+class UserForce(Staged):
     """The hand (or the uterus) that pushes the end effector.
 
     Three methods make a hand; a class of your own overrides those that it needs.
@@ -68,15 +68,15 @@ class CompiledForce(UserForce):
     """A force that a ``stage`` of the closed loop computes."""
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        forces, stage = np.zeros((time.shape[0], 2, time.shape[1])), self.stage()
+        forces, stages = np.zeros((time.shape[0], 2, time.shape[1])), [self.stage()]
         motion = [(np.concatenate([position, velocity]), MOTION)] if self.closed_loop else []
         for now, force in zip(np.array(time, dtype=np.float64), forces, strict=True):
-            Loop(len(now), [(force, FORCE), *motion], [(now[None], TIME)], [stage]).run()
+            Loop(len(now), [(force, FORCE), *motion], [(now[None], TIME)], stages).run()
         return forces
 
     def stage(self) -> Stage:
         """``force``, compiled into the closed loop."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__}.stage() is missing; it returns a birthsim_env.loop.stage.Stage")
 
 
 def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) -> Array:
@@ -157,6 +157,7 @@ class ForceProfile(CompiledForce):
     """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
 
     in_state: ClassVar[Declared] = {"_knots": Kept(grows=True, shortest=1), "_counts": Kept(1, "_knots", whole=True)}
+    _knots: Array = np.zeros((1, 3, 0))
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
         if not (knots is None or isinstance(knots, (list, tuple))):
@@ -171,7 +172,7 @@ class ForceProfile(CompiledForce):
         return self._fixed
 
     def prepare(self, num_envs: int) -> None:
-        self._knots: Array = np.zeros((1, 3, num_envs))
+        self._knots = np.zeros((1, 3, num_envs))
         self._counts = np.ones(num_envs)
 
     @vectorised
@@ -188,7 +189,7 @@ class ForceProfile(CompiledForce):
 
     def first_knot(self, lanes: NDArray[np.intp]) -> float:
         """When the first knot of any of ``lanes`` (L,) is, s; 0 for a class that prepares no knots."""
-        return float(self._knots[0, 0].take(lanes).min()) if hasattr(self, "_knots") else 0.0
+        return float(self._knots[0, 0].take(lanes).min()) if self._knots.size else 0.0
 
     def stage(self) -> Stage:
         return Stage(_interpolate, tables=(self._knots, self._counts))

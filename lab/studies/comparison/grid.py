@@ -24,8 +24,8 @@ from baselines.registry import controlling_names, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.assembly import Arguments
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
-from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
 from lab.studies.comparison.paired import paired_ratios, summary_with_interval

@@ -8,7 +8,7 @@ import agents  # noqa: F401  registers the residual environments
 from baselines.bench.statistics import quantile
 from baselines.registry import LIMITED
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.registry import names
 from lab.studies.comparison.grid import default_controllers
 from lab.studies.gradients.loops import begun, compared
 from lab.studies.results import Content
@@ -37,7 +37,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
     loops = {name: {"world": name, "lanes": options.states, "steps": 1, "begins": 300} for name in SCENARIOS}
     loops["a hand that feels"] = {**loops[CIRCLE], "user_force": "guided"}
     for name in CONTROLLERS:
-        for sensors in SENSORS:
+        for sensors in names("sensors"):
             loop = {"world": CIRCLE, "controller": name, "sensors": sensors, "lanes": options.lanes, "steps": 4, "begins": 20}
             loops[f"{name}, {sensors}"] = loop
     return {name: Task(f"agreement{k}", agreement, loop) for k, (name, loop) in enumerate(loops.items())}

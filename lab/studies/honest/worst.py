@@ -16,10 +16,11 @@ from birthsim_env.parts.drawn.randomization import documented_ranges, draw_param
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from birthsim_env.physics.rig.values import checked_number
+from birthsim_env.registry import names
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
 from lab.studies.results import Content
@@ -178,7 +179,7 @@ STUDY = Study(
     (__name__,),
     {
         "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"),
-        "sensors": tuple(SENSORS),
+        "sensors": tuple(names("sensors")),
         "drawn": False,
         "metric": "stiffness_error",
         "limit": 15.0,
@@ -191,7 +192,7 @@ STUDY = Study(
     lambda _, found: list(found.values()),
     {**UNITS, "push_n": "N", "way_mm": "mm"},
     _shown,
-    allowed={"sensors": tuple(SENSORS), "metric": tuple(UNITS)},
+    allowed={"sensors": tuple(names("sensors")), "metric": tuple(UNITS)},
     words={
         "controller": "registered names",
         "drawn": "randomise the figures of honest sensors too",

@@ -17,9 +17,9 @@ from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 
 assert agents  # registers the environments with a law inside
 
@@ -75,7 +75,7 @@ def world_of(number: int, seed: int) -> World:
         return options[int(rng.integers(len(options)))]
 
     scenario = list(SCENARIOS)[number % len(SCENARIOS)]
-    friction, sensors, randomize = one(FRICTION), one(list(SENSORS)), one(VARIED)
+    friction, sensors, randomize = one(FRICTION), one(names("sensors")), one(VARIED)
     ranges = documented_ranges(Parameters())
     corner = {name: float(one(bounds)) for name, bounds in ranges.items()} if randomize is not True else {}
     hand = one([None, None, None, *HANDS])

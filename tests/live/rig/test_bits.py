@@ -9,7 +9,7 @@ from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
 from birthsim_env import Parameters, StiffnessSchedule, UserForce
 from birthsim_env.loop.rows import SINCE_JUMP
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.registry import names
 from birthsim_live.rig.folder import packed_page, write_page
 from birthsim_live.rig.words import LEARNING
 from lab.studies.targets.reference import SHARED, loop_rows
@@ -98,7 +98,10 @@ def test_a_law_a_policy_hands_and_another_rig(page):
 
 @pytest.mark.slow
 def test_every_scenario_with_every_sensor(page):
-    check(page, *(({"scenario": one, "sensors": kind, "scenario_force": True}, None) for one in SCENARIOS for kind in SENSORS))
+    check(
+        page,
+        *(({"scenario": one, "sensors": kind, "scenario_force": True}, None) for one in SCENARIOS for kind in names("sensors")),
+    )
 
 
 @pytest.mark.slow
