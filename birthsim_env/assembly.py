@@ -18,7 +18,7 @@ from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn, check_points
 from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
 from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import find_scenario
 from birthsim_env.parts.sensors.model import drawn_by, models_that_draw
 from birthsim_env.parts.times import called, check_times
 from birthsim_env.physics.rig.arrays import floats_of
@@ -143,7 +143,7 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     refuse_unknown(arguments)
     given: Arguments = {**DEFAULTS, **arguments}
     randomize, actuation, duration = given["randomize"], given["actuation"], given["duration"]
-    table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
+    table = find_scenario(scenario)
     rig = load_parameters(given["parameters"])
     valves = one_of("valves", given["valves"], VALVE_LAYOUTS)
     sensors = entry("sensors", given["sensors"]).name

@@ -93,6 +93,7 @@ _ENTERED: set[str] = set()
 _BROKEN: dict[str, str] = {}
 _ENTERING = threading.RLock()
 _RECORDS: list[set[tuple[str, str]]] = []
+_FOLLOWED: dict[str, list[Callable[[Entry], None]]] = {kind: [] for kind in ROOMS}
 
 
 def register(
@@ -123,7 +124,10 @@ def register(
             raise ValueError(f"{kind} = {shown(name)} is registered by {_WHERE[kind, name]}; allowed in {where}: another name")
         preset = MappingProxyType(dict(options or {}))
         _WHERE[kind, name] = where
-        _ENTRIES[kind][name] = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order)
+        one = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order)
+        _ENTRIES[kind][name] = one
+        for do in _FOLLOWED.get(kind, ()):
+            do(one)
         return made
 
     return keep
@@ -184,6 +188,13 @@ def entries(kind: str, listed: bool | None = None) -> list[Entry]:
     _enter(kind)
     found = (one for one in _ENTRIES[kind].values() if listed is None or one.listed is listed)
     return sorted(found, key=lambda one: (one.order, one.name))
+
+
+def follow(kind: str, do: Callable[[Entry], None]) -> None:
+    """Call ``do`` for every entry of a kind, also for one that is registered later."""
+    for one in entries(kind):
+        do(one)
+    _FOLLOWED[kind].append(do)
 
 
 def names(kind: str, listed: bool | None = None) -> list[str]:

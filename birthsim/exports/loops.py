@@ -22,7 +22,6 @@ from birthsim_build.code.ptx import require_assembler
 from birthsim_build.code.targets import TARGETS
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json
-from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import names, register
 
@@ -120,7 +119,7 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
     if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        return list(SCENARIOS), names("sensors"), compiled_names(listed=True), _shipped()
+        return names("scenario"), names("sensors"), compiled_names(listed=True), _shipped()
     scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
     controllers = settings.controller or ([] if settings.policy else ["backstepping"])
     return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy

@@ -7,7 +7,7 @@ from birthsim_build.bundle import Bundle
 from birthsim_build.faces.module import HERE, Store, described, write_module
 from birthsim_build.layout import LAYOUT
 from birthsim_build.loops import ORDER, PAIRED_VALVES
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import find_scenario
 from birthsim_env.registry import entries
 
 
@@ -30,7 +30,7 @@ def _index(bundle: Bundle, store: Store) -> dict[str, Any]:
     number, begins = store.number, store.rows
     scenarios: dict[str, Any] = {}
     for (scenario, sensors), world in bundle.worlds.items():
-        about = {"title": SCENARIOS[scenario].title, "duration": SCENARIOS[scenario].duration, "sensors": {}}
+        about = {"title": find_scenario(scenario).title, "duration": find_scenario(scenario).duration, "sensors": {}}
         of_sensors = scenarios.setdefault(scenario, about)["sensors"]
         of_sensors[sensors] = {"rows": begins(world.rows), "parts": {name: number(part) for name, part in world.parts.items()}}
     controllers: dict[str, dict[str, int]] = {}

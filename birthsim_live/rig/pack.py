@@ -25,7 +25,7 @@ from birthsim_env.loop.stage import Stage, stage_of
 from birthsim_env.loop.world import FurtherStates, plant_stage
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import SCENARIOS, Parts
+from birthsim_env.parts.scenarios import Parts, find_scenario
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array, parameter_column
@@ -129,7 +129,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         },
         "parts": numbers,
         "scenarios": {
-            name: {"duration": (lasts := SCENARIOS[name].duration), "path": path_of(begun(name), lasts)}
+            name: {"duration": (lasts := find_scenario(name).duration), "path": path_of(begun(name), lasts)}
             for name in parts["scenarios"]
         },
         "sampled": {name: entry("sensors", name).made.sampled for name in parts["sensors"]},
@@ -157,7 +157,7 @@ def rig_numbers(rig: Parameters) -> dict[str, Any]:
 
 def begun(name: str) -> Parts:
     """Target, hand and setpoints of a nominal scenario, which are the same in every episode."""
-    parts: Parts = SCENARIOS[name].nominal()
+    parts: Parts = find_scenario(name).nominal()
     for part, channel in zip(parts, ("reference", "user_force", "stiffness"), strict=True):
         part.prepare(1)  # type: ignore[attr-defined]
         part.begin(0, stream(0, 0, channel))  # type: ignore[attr-defined]
@@ -183,7 +183,7 @@ def _problem(name: str, rig: Parameters) -> str:
     """Why a rig cannot do a scenario: its target leaves the workspace, or the rig cannot carry its weight there."""
     target, _, setpoints = begun(name)
     try:
-        start = checked_start(target, setpoints, np.array([0]), 1, SCENARIOS[name].duration, rig)
+        start = checked_start(target, setpoints, np.array([0]), 1, find_scenario(name).duration, rig)
         require_carried(start[:2], rig)
     except ValueError as error:
         if name == "probe":  # with which the page opens

@@ -6,7 +6,6 @@ from typing import Any
 
 import birthsim_env
 from baselines.controller import RESIDUAL
-from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.registry import entries
 
 FIGURES = {
@@ -38,7 +37,7 @@ CHOICES = {
         "one_valve": "One 5/3 valve a cylinder: what fills one chamber empties the other.",
     },
     "sensors": {model.name: model.about for model in entries("sensors")},
-    "scenario": {name: scenario.about for name, scenario in SCENARIOS.items()},
+    "scenario": {scenario.name: scenario.about for scenario in entries("scenario")},
 }
 """Setting -> choice -> what it is; controllers say it where they are registered."""
 

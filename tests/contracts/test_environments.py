@@ -17,7 +17,7 @@ import birthsim_env
 from agents.residual.settings import IMPEDANCES, LAWS
 from birthsim_env.info import FIELDS
 from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
 from birthsim_env.reward import REWARD_TERMS
@@ -27,7 +27,7 @@ CIRCLE, RESIDUAL, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1", 
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
 WORLDS = {
     **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True})
-       for name, sensors in itertools.product(SCENARIOS, names("sensors"))},
+       for name, sensors in itertools.product(names("scenario"), names("sensors"))},
     **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in HANDS},
     **{f"law {law} {sensors}": (RESIDUAL, {"law": law, "sensors": sensors, "randomize": True})
        for law, sensors in itertools.product(LAWS, names("sensors"))},
@@ -90,7 +90,7 @@ def test_both_checkers_find_nothing_to_say(name, arguments, monkeypatch):
 
 def test_importing_again_neither_warns_nor_changes_the_registry():
     before = {name: gymnasium.registry[name] for name in IDS}
-    assert set(IDS) == {environment_id(name, kind) for name in SCENARIOS for kind in ("", "Residual")}
+    assert set(IDS) == {environment_id(name, kind) for name in names("scenario") for kind in ("", "Residual")}
     importlib.reload(birthsim_env)
     assert all(gymnasium.registry[name] is spec for name, spec in before.items())
 

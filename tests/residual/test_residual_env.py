@@ -11,11 +11,11 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.registry import names
 from tests.oracles.residual_parts import UnexplainedForceObserver
 
-IDS = tuple(environment_id(name, "Residual") for name in SCENARIOS)
+IDS = tuple(environment_id(name, "Residual") for name in names("scenario"))
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 RIG = Parameters()
 

@@ -16,7 +16,7 @@ from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
@@ -74,7 +74,7 @@ def world_of(number: int, seed: int) -> World:
     def one(options: Any) -> Any:
         return options[int(rng.integers(len(options)))]
 
-    scenario = list(SCENARIOS)[number % len(SCENARIOS)]
+    scenario = names("scenario")[number % len(names("scenario"))]
     friction, sensors, randomize = one(FRICTION), one(names("sensors")), one(VARIED)
     ranges = documented_ranges(Parameters())
     corner = {name: float(one(bounds)) for name, bounds in ranges.items()} if randomize is not True else {}
