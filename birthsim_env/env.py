@@ -13,9 +13,9 @@ from birthsim_env.episodes import Episodes
 from birthsim_env.face import Face, measurement_of
 from birthsim_env.info import single_info
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.scenarios import environment_id, find_scenario
+from birthsim_env.parts.scenarios import Scenario, environment_id
 from birthsim_env.physics.rig.values import whole_of
-from birthsim_env.registry import names
+from birthsim_env.registry import Entry, entries
 from birthsim_env.reward import REWARD_TERMS
 
 _ONE = np.ones(1, dtype=np.bool_)
@@ -194,10 +194,10 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self._episodes.close()
 
 
-def _row_of(scenario: str) -> str:
+def _row_of(scenario: Entry) -> str:
     """A scenario's row in the table of ids."""
-    made = find_scenario(scenario)
-    return f"    | `{environment_id(scenario)}` | {made.experiment} | {made.duration:g} |"
+    made: Scenario = scenario.made()
+    return f"    | `{environment_id(scenario.name)}` | {made.experiment} | {made.duration:g} |"
 
 
-BirthSIMEnv.__doc__ = (BirthSIMEnv.__doc__ or "").replace("    {scenarios}", "\n".join(map(_row_of, names("scenario"))))
+BirthSIMEnv.__doc__ = (BirthSIMEnv.__doc__ or "").replace("    {scenarios}", "\n".join(map(_row_of, entries("scenario"))))

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.parts.drawn.streams import Streams
-from birthsim_env.parts.sensors.model import drawn_by, models_that_draw
+from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters, field_of, least_dead_volume
 from birthsim_env.physics.rig.values import is_finite, shown
+from birthsim_env.registry import entries
 
 Ranges = Mapping[str, tuple[float, float]]
 
@@ -37,7 +38,7 @@ KNOWN = 0.2
 
 def _drawn_by_some() -> set[str]:
     """Names of the parameters that one sensor model or another draws."""
-    return {name for model in models_that_draw() for name in drawn_by(model)}
+    return {name for model in entries("sensors") for name in model.made.drawn}
 
 
 def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:

@@ -63,5 +63,8 @@ def studied_scenarios() -> list[str]:
 
 def environment_id(scenario: str, kind: str = "") -> str:
     """Gymnasium's id of a scenario; ``kind`` "Residual" is the one with a law inside."""
+    versions = {one.name: one.made.version for one in entries("scenario")}
+    if scenario not in versions:
+        entry("scenario", scenario)  # refuses it
     name = "".join(word.capitalize() for word in re.split(r"\W|_", scenario))
-    return f"BirthSIM/{name}{kind}-v{find_scenario(scenario).version}"
+    return f"BirthSIM/{name}{kind}-v{versions[scenario]}"
