@@ -13,7 +13,7 @@ from agents.policy.shipped import loadable_names
 from baselines.controller import RESIDUAL
 from baselines.registry import compiled_names
 from baselines.tables import aligned
-from birthsim.command_line.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
+from birthsim.command_line.settings import CONTROL, CONTROLLER, ENV, MANY, SENSORS, Configured, RigFile, Seed
 from birthsim.exports import Form
 from birthsim_build.building import Report, build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import make_bundle, scenario_of
@@ -51,9 +51,9 @@ class Settings(Configured):
 
     to: Annotated[str, Parameter(choices=tuple(FORMS))]
     """Target; c: this processor."""
-    env: Annotated[list[str], MANY, Parameter(group=WORLD, metavar="ID...")] = field(default_factory=list)
+    env: Annotated[list[str], MANY, ENV, Parameter(metavar="ID...")] = field(default_factory=list)
     """Environments, else BirthSIM/Circle-v1; not for cortex-m7."""
-    sensors: Annotated[list[Kind], MANY, Parameter(group=WORLD)] = field(default_factory=list)
+    sensors: Annotated[list[str], MANY, SENSORS] = field(default_factory=list)
     """Sensor models, else ideal."""
     controller: Annotated[list[str], MANY, CONTROLLER, Parameter(metavar="NAME...")] = field(default_factory=list)
     """Compiled controllers, else backstepping."""

@@ -16,7 +16,6 @@ from stable_baselines3.common.env_checker import check_env as stable_baselines_c
 import birthsim_env
 from agents.residual.settings import IMPEDANCES, LAWS
 from birthsim_env.info import FIELDS
-from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
@@ -28,7 +27,7 @@ FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "elect
 WORLDS = {
     **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True})
        for name, sensors in itertools.product(names("scenario"), names("sensors"))},
-    **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in HANDS},
+    **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in names("hand")},
     **{f"law {law} {sensors}": (RESIDUAL, {"law": law, "sensors": sensors, "randomize": True})
        for law, sensors in itertools.product(LAWS, names("sensors"))},
     **{f"impedance {mode}": ("BirthSIM/DystociaResidual-v1", {"impedance": mode}) for mode in IMPEDANCES},

@@ -12,7 +12,8 @@ import agents  # noqa: F401  registers the residual environments
 from birthsim_env import Circle, StiffnessSchedule
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.parts.actuation import ValveActuation
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, ForceProfile
+from birthsim_env.parts.hands.steps import AlternatingSteps
+from birthsim_env.parts.hands.user_forces import ForceProfile
 from birthsim_env.parts.sensors.ideal import IdealSensors
 from birthsim_env.registry import names
 from tests.registered import registered

@@ -13,7 +13,6 @@ from birthsim_env.parts import courses
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.drawn.streams import TOGETHER, Streams, begin, worlds
-from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import parameter_column
@@ -114,7 +113,7 @@ CASES = [
         for name in names("scenario")
         for varied in (False, True, "scenario")
     ),
-    *({"scenario": "circle", "user_force": hand, "randomize": varied} for hand in HANDS for varied in (False, True)),
+    *({"scenario": "circle", "user_force": hand, "randomize": varied} for hand in names("hand") for varied in (False, True)),
     *({"scenario": "probe", "randomize": ranges} for ranges in RANGES.values()),
     {"scenario": "circle", "user_force": ForceProfile([(0, 0, 0), (1.0, 3.0, 4.0), (1.0, 0, 0)]), "randomize": True},
     {"scenario": "circle", "stiffness": StiffnessSchedule((0.0, 1.0), (2000.0, 3000.0), ((4000.0, 4600.0),) * 2, (2300.0,) * 2,

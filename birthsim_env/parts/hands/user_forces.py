@@ -1,10 +1,11 @@
 """Forces of the user's hand at the end effector, evaluated for all lanes at once.
 
-A user's own force derives from ``UserForce`` and implements ``force``. The built-in ones are piecewise linear in time.
+A user's own force derives from ``UserForce`` and implements ``force``. ``ForceProfile`` is piecewise linear in time. A hand
+that is registered in its own file by ``@register(hand="name", about="...")`` is also known by its name.
 """
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.arrays import shape_of
-from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
+from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 from birthsim_env.restored import Declared, Kept
 
 STRONGEST = 1000.0
@@ -48,9 +49,19 @@ class UserForce(Staged):
     ``info["since_jump"]`` starts anew. ``timed`` says when it does something, where that is known.
     """
 
-    closed_loop = False
-    jump_rate = 150.0
+    closed_loop: bool = False
+    """Whether it feels the rig: whether ``force`` depends on position or velocity."""
+
+    jump_rate: float = 150.0
+    """N/s of a component, beyond which a change counts as a jump."""
+
     timed: Timed | None = None
+    """When it does something, where that is known."""
+
+    @classmethod
+    def varied(cls) -> Self:
+        """What the name of a registered hand stands for where ``randomize`` draws the experiment: its numbers are ranges."""
+        return cls()
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
@@ -193,36 +204,6 @@ class ForceProfile(CompiledForce):
 
     def stage(self) -> Stage:
         return Stage(_interpolate, tables=(self._knots, self._counts))
-
-
-class AlternatingSteps(ForceProfile):
-    """The pushes of Fig. 4, repeated every ``repeat`` s: +x, -x, +y, -y of ``amplitude`` N, ``ramp`` s up and down."""
-
-    STARTS = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0), (6.9, 7.7))
-    """Assumed: start and end of the four pushes, s; every push ends well before the next."""
-
-    jump_rate = 1.0
-    """N/s: every ramp is a step, however small the push."""
-
-    def __init__(self, amplitude: Range = 30.0, ramp: float = 0.1, repeat: float = 8.0, repeats: int = 2) -> None:
-        super().__init__()
-        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
-        checked_number("ramp", ramp, "s", least=0.0, most=0.3)
-        checked_number("repeat", repeat, "s", least=8.0, most=LONGEST)
-        repeats = checked_count("repeats", repeats, 0, MOST)
-        self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
-
-    @vectorised
-    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-        knots = [(0.0, 0.0, 0.0)]
-        directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
-        for k in range(self.repeats):
-            for (start, end), (dx, dy) in zip(self.STARTS, directions, strict=True):
-                size = draw(self.amplitude, rng)
-                begin, stop = k * self.repeat + start, k * self.repeat + end
-                knots += [(begin, 0.0, 0.0), (begin + self.ramp, size * dx, size * dy)]
-                knots += [(stop, size * dx, size * dy), (stop + self.ramp, 0.0, 0.0)]
-        return knots
 
 
 class Ramp(ForceProfile):

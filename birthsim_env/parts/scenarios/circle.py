@@ -1,6 +1,6 @@
 """The experiment of Fig. 4."""
 
-from birthsim_env.parts.hands.user_forces import AlternatingSteps
+from birthsim_env.parts.hands.steps import AlternatingSteps
 from birthsim_env.parts.references import Circle
 from birthsim_env.parts.scenarios import Parts, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule

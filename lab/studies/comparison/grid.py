@@ -53,7 +53,7 @@ RIGS = {
 """Plant -> its words in tables and pictures."""
 
 MOVING = ("sine", "noise", "guided")
-"""Hands of ``birthsim_env.parts.hands.moving_hands`` that move all the time."""
+"""Hands that move all the time."""
 
 LEARNED = "residual:"
 """Before the name of a policy, of which all training seeds are measured together."""

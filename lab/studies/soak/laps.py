@@ -15,7 +15,6 @@ import agents
 from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -78,7 +77,7 @@ def world_of(number: int, seed: int) -> World:
     friction, sensors, randomize = one(FRICTION), one(names("sensors")), one(VARIED)
     ranges = documented_ranges(Parameters())
     corner = {name: float(one(bounds)) for name, bounds in ranges.items()} if randomize is not True else {}
-    hand = one([None, None, None, *HANDS])
+    hand = one([None, None, None, *names("hand")])
     kind = rng.random()
     if kind < 0.6:
         arguments = {"action_mode": one(("valve", "flow")), "valves": one(("two_valves", "one_valve"))}
