@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from baselines.controller import RESIDUAL
 from birthsim_build.image import Part, Words, function_name
 from birthsim_build.loops import PAIRED_VALVES, World, image_of, law_part, plant_world, scenario_world
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import entry, names
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def identifier(name: str) -> str:
 
 def scenario_of(environment: str) -> str:
     """The scenario of an environment's id; ``ValueError`` names those that there are."""
-    known = {environment_id(name): name for name in SCENARIOS}
+    known = {environment_id(name): name for name in names("scenario")}
     if environment not in known:
         raise ValueError(f"--env {environment!r}; allowed: {', '.join(known)}")
     return known[environment]
@@ -74,7 +74,7 @@ def make_bundle(
     """
     pairs = [] if alone else [(scenario, kind) for scenario in scenarios for kind in sensors]
     worlds = {(scenario, kind): scenario_world(environment_id(scenario), kind, rig, seed) for scenario, kind in pairs}
-    kinds = sorted({SENSORS[kind].sampled for kind in sensors})
+    kinds = sorted({entry("sensors", kind).made.sampled for kind in sensors})
     names = [*controllers, *(f"{RESIDUAL}:{name}" for name in policies)]
     laws = {(name, kind): law_part(name, rig, kind) for name in names for kind in kinds}
     return Bundle(rig, worlds, laws, None if alone else plant_world(rig))

@@ -18,12 +18,13 @@ from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn, check_points
 from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
 from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.parts.sensors.model import drawn_by, models_that_draw
 from birthsim_env.parts.times import called, check_times
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, near, shown, whole_of
+from birthsim_env.registry import entry
 from birthsim_env.simulation import Simulation
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -142,10 +143,10 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     refuse_unknown(arguments)
     given: Arguments = {**DEFAULTS, **arguments}
     randomize, actuation, duration = given["randomize"], given["actuation"], given["duration"]
-    table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
+    table = find_scenario(scenario)
     rig = load_parameters(given["parameters"])
     valves = one_of("valves", given["valves"], VALVE_LAYOUTS)
-    sensors = one_of("sensors", given["sensors"], tuple(SENSORS))
+    sensors = entry("sensors", given["sensors"]).name
     one_of("force_sensor", given["force_sensor"], (True, False))
     one_of("clip_actions", given["clip_actions"], (True, False))
     if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
@@ -161,7 +162,7 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
         ranges = checked_ranges(ranges_of(rig, randomize, sensors), rig, sensors)
         varied = randomize in (True, "scenario", "sensors")
         if randomize == "sensors" and not drawn_by(sensors):
-            able = ", ".join(repr(name) for name in SENSORS if drawn_by(name))
+            able = ", ".join(map(repr, models_that_draw()))
             raise ValueError(f"randomize = 'sensors' with sensors = {sensors!r}; allowed: with sensors = {able}")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not is_within(duration, above=0.0, most=LONGEST):

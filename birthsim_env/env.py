@@ -13,7 +13,9 @@ from birthsim_env.episodes import Episodes
 from birthsim_env.face import Face, measurement_of
 from birthsim_env.info import single_info
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.parts.scenarios import Scenario, environment_id
 from birthsim_env.physics.rig.values import whole_of
+from birthsim_env.registry import Entry, entries
 from birthsim_env.reward import REWARD_TERMS
 
 _ONE = np.ones(1, dtype=np.bool_)
@@ -30,12 +32,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     | id | experiment | s |
     |---|---|---|
-    | `BirthSIM/Circle-v1` | Fig. 4: a circle of 50 mm under pushes of 30 N, stiffness 2000 then 4000 N/m | 16 |
-    | `BirthSIM/Probe-v2` | hold still and, after 3 s, be pushed: the stiffness test | 7 |
-    | `BirthSIM/Descent-v1` | station -5 to +5 cm, then an arc of 70 mm through 80 degrees, contractions of 80 N | 24 |
-    | `BirthSIM/Forceps-v1` | tractions ramped at 70 N/s to 175 N, held, released | 15 |
-    | `BirthSIM/Dystocia-v1` | the head draws back 12 mm, stiffness 2000 to 4000 N/m, pulls of 84, 122 and 163 N | 16 |
-    | `BirthSIM/Vacuum-v0` | the head comes 40 mm, vacuum tractions of 176, 225 and 241 N | 24 |
+    {scenarios}
 
     ## Action space
     `Box(-1, 1, (n,), float32)`, held for one policy period (10 ms):
@@ -195,3 +192,12 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def close(self) -> None:
         """Close the window, if there is one."""
         self._episodes.close()
+
+
+def _row_of(scenario: Entry) -> str:
+    """A scenario's row in the table of ids."""
+    made: Scenario = scenario.made()
+    return f"    | `{environment_id(scenario.name)}` | {made.experiment} | {made.duration:g} |"
+
+
+BirthSIMEnv.__doc__ = (BirthSIMEnv.__doc__ or "").replace("    {scenarios}", "\n".join(map(_row_of, entries("scenario"))))

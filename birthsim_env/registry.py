@@ -94,6 +94,7 @@ _ENTERED: set[str] = set()
 _BROKEN: dict[str, str] = {}
 _ENTERING = threading.RLock()
 _RECORDS: list[set[tuple[str, str]]] = []
+_FOLLOWED: dict[str, list[Callable[[Entry], None]]] = {kind: [] for kind in ROOMS}
 
 
 def register(
@@ -168,7 +169,10 @@ def register(
         if there is not None and (there.module != where or there.made is made or _called(there.made) != _called(made)):
             raise ValueError(f"{kind} = {shown(name)} is registered by {there.module}; allowed in {where}: another name")
         preset = MappingProxyType(dict(options or {}))
-        _ENTRIES[kind][name] = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order, where)
+        one = Entry(kind, name, made, about, frozenset(needs), listed, preset, deprecated, order, where)
+        _ENTRIES[kind][name] = one
+        for do in _FOLLOWED.get(kind, ()):
+            do(one)
         return made
 
     return keep
@@ -236,12 +240,19 @@ def entries(kind: str, listed: bool | None = None) -> list[Entry]:
     return sorted(found, key=lambda one: (one.order, one.name))
 
 
+def follow(kind: str, do: Callable[[Entry], None]) -> None:
+    """Call ``do`` for every entry of a kind, also for one that is registered later."""
+    for one in entries(kind):
+        do(one)
+    _FOLLOWED[kind].append(do)
+
+
 def names(kind: str, listed: bool | None = None) -> list[str]:
     """The names of ``entries``."""
     return [one.name for one in entries(kind, listed)]
 
 
-def entry(kind: str, name: str, more: str = "") -> Entry:
+def entry(kind: str, name: Any, more: str = "") -> Entry:
     """The entry of a name; ``used`` takes note of it. One that is deprecated warns of what takes its place.
 
     Raises

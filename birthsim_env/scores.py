@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
 from birthsim_env.physics.rig.values import shown
+from birthsim_env.registry import names
 
 FILE = Path(__file__).with_name("scores.json")
 
@@ -34,6 +35,17 @@ RIGS = {False: "nominal", True: "drawn"}
 def _scores() -> dict[str, Any]:
     scores: dict[str, Any] = read_json("scores", FILE, {"scores": Each(dict)})["scores"]
     return scores
+
+
+def _scored() -> dict[str, Any]:
+    """Id -> scores, of the environments that have any."""
+    scores = _scores()
+    return {
+        environment_id(scenario, kind): scores[name]
+        for scenario in names("scenario")
+        if (name := environment_id(scenario).removeprefix("BirthSIM/").rpartition("-v")[0]) in scores
+        for kind in ("", "Residual")
+    }
 
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
@@ -71,13 +83,15 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     >>> known["shut valves"]["return"] < known["best classical law"]["return"]
     True
     """
-    names = {environment_id(scenario, kind): scenario for scenario in SCENARIOS for kind in ("", "Residual")}
-    if not isinstance(environment, str) or environment not in names:
-        allowed = ", ".join(environment_id(scenario) for scenario in SCENARIOS)
-        raise ValueError(f"environment = {environment!r}; allowed: {allowed}, and the same with Residual before -v")
+    scored = _scored()
+    if not isinstance(environment, str) or environment not in scored:
+        allowed = ", ".join(name for name in scored if "Residual" not in name)
+        raise ValueError(
+            f"environment = {environment!r} has no reference scores; allowed: {allowed}, and the same with Residual before -v"
+        )
     one_of("sensors", sensors, SENSORS)
     one_of("randomize", randomize, tuple(RIGS))
-    return _scores()[names[environment].capitalize()][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
+    return scored[environment][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
 
 
 def normalized_score(

@@ -15,7 +15,7 @@ from birthsim_env.loop.instant import Instant
 from birthsim_env.loop.loop import MixedLoop, Place
 from birthsim_env.loop.rows import fill_measurement
 from birthsim_env.loop.signals import Mask, Reference
-from birthsim_env.loop.stage import Part, Stage
+from birthsim_env.loop.stage import Part, Stage, stage_of
 from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import check_knots, checked_start
@@ -23,7 +23,7 @@ from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.streams import begin, worlds
 from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
@@ -33,6 +33,7 @@ from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import plain
 from birthsim_env.physics.strength import require_carried
+from birthsim_env.registry import entry
 from birthsim_env.restored import Declared, Kept, is_own
 
 if TYPE_CHECKING:
@@ -75,10 +76,10 @@ class Simulation(Instant):
         super().__init__(parameters, num_envs)
         self.nominal = parameter_column(parameters)
         self.trajectory, self.user_force, self.stiffness = trajectory, user_force, stiffness
-        self.sensors = SENSORS[sensors](parameters.electronics, num_envs)
-        of_sensors = {name: ranges[name] for name in ranges if name in drawn_by(sensors)}
+        self.sensors: SensorModel = entry("sensors", sensors).made(parameters.electronics, num_envs)
+        of_sensors = {name: ranges[name] for name in ranges if name in self.sensors.drawn}
         if of_sensors:
-            self.sensors.vary(of_sensors)  # type: ignore[attr-defined]
+            self.sensors.vary(of_sensors)
         self.actuation = actuation
         for part in (trajectory, user_force, stiffness):
             if is_own(type(part)):
@@ -228,16 +229,16 @@ class Simulation(Instant):
         """What a control period runs, in this order: stages, and methods that call what a user has written in Python.
 
         Those of ``LOOKS`` also run where an episode ``begins``."""
-        stages, put_out = getattr(self.actuation, "stages", None), hasattr(self.sensors, "put_out")
-        board = getattr(self.sensors, "board_stage", lambda: self._put_out)
-        measure = self._compiled(self.sensors, "measure", self._measure)
-        target = self._compiled(self.trajectory, "sample", self._follow)
-        setpoints = self._compiled(self.stiffness, "sample", self._set)
-        hand = self._compiled(self.user_force, "force", self._push)
+        stages = getattr(self.actuation, "stages", None)
+        board = stage_of(self.sensors, "put_out", "board_stage") or self._put_out
+        measure = stage_of(self.sensors, "measure") or self._measure
+        target = stage_of(self.trajectory, "sample") or self._follow
+        setpoints = stage_of(self.stiffness, "sample") or self._set
+        hand = stage_of(self.user_force, "force") or self._push
         foreign = not all(isinstance(one, Stage) for one in (measure, target, setpoints, hand))
         return {
             "actuation": [*stages(self.plant.num_envs, self.sensors.sampled, foreign)] if stages else [self._ask],
-            "board": [board()] if put_out else [],
+            "board": [board] if self.sensors.has_board else [],
             "plant": [plant_stage(self.plant.lane_parameters, self.plant.memory, self.period)],
             "target": [target],
             "setpoints": [setpoints],
@@ -267,17 +268,6 @@ class Simulation(Instant):
         lanes, places, parts = self.plant.num_envs, self.places(), self.parts()
         return MixedLoop(lanes, *places, parts["plant"]), MixedLoop(lanes, *places, [*parts["actuation"], *parts["board"]])
 
-    @staticmethod
-    def _compiled(part: Any, method: str, instead: Part) -> Part:
-        """The stage of a part, unless a class that derives from a compiled one has changed ``method``."""
-        for kind in type(part).__mro__:
-            if "stage" in vars(kind):
-                stage: Stage = part.stage()
-                return stage
-            if method in vars(kind):
-                break
-        return instead
-
     def _ask(self, period: int) -> None:
         if period == 0 or self.actuation.every_period:
             openings = self.actuation.openings(self.plant, self.measurement, self.reference)
@@ -288,7 +278,7 @@ class Simulation(Instant):
         self._openings[:] = self._wanted
 
     def _put_out(self, _: int) -> None:
-        self._openings[:] = self.sensors.put_out(self.ticks, self._openings)  # type: ignore[attr-defined]
+        self._openings[:] = self.sensors.put_out(self.ticks, self._openings)
 
     def _follow(self, _: int) -> None:
         rows = self.trajectory.sample(self.time)

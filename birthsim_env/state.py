@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Stage, Staged
 from birthsim_env.physics.rig.json_reading import parse_json
 from birthsim_env.physics.rig.values import in_line
 from birthsim_env.restored import (
@@ -109,7 +109,7 @@ class _Entry:
                 most = len(counted) - self.kept.index if np.ndim(counted) else 0
             return self.kept.complaint(before, value, most)
         if not self.owner.is_own and not self.constant:
-            return own_complaint(before, value, hasattr(self.owner.of, "stage") or hasattr(self.owner.of, "stages"))
+            return own_complaint(before, value, _has_stage(self.owner.of))
         if isinstance(before, np.ndarray) and before.dtype.kind in "fb" and not self.constant:
             return FLOATS.complaint(before, value, np.inf)
         return constant_complaint(before, value)
@@ -122,6 +122,11 @@ class _Entry:
             before[...] = value
         else:
             self.content[self.key] = value[()] if isinstance(before, np.generic) else value
+
+
+def _has_stage(part: Any) -> bool:
+    """Whether machine code works on the arrays of a part."""
+    return hasattr(part, "stages") or (isinstance(part, Staged) and type(part).stage is not Staged.stage)
 
 
 class _Walk:

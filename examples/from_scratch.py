@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.registry import names
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = {"Stable-Baselines3": "sb3_ppo.py", "CleanRL": "cleanrl_ppo.py"}
@@ -39,7 +40,7 @@ def run(job):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--env", nargs="+", default=[environment_id(name) for name in SCENARIOS])
+    parser.add_argument("--env", nargs="+", default=[environment_id(name) for name in names("scenario")])
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)

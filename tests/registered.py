@@ -1,4 +1,4 @@
-"""A registry for one test: what is registered in it is gone afterwards."""
+"""Registers something for the time of one test."""
 
 from importlib.metadata import EntryPoint
 
@@ -14,3 +14,10 @@ def with_plugins(monkeypatch, *modules, kinds=("controller", "policy")):
     monkeypatch.setattr(registry, "_ENTERED", set())
     monkeypatch.setattr(registry, "_BROKEN", {})
     monkeypatch.setattr(registry, "entry_points", lambda group: points if group == registry.PLUGINS else [])
+
+
+def registered(monkeypatch, made, about="of a test", **named):
+    """As ``registry.register(kind="name", about=...)(made)`` until the test ends; it may take the place of another entry."""
+    ((kind, name),) = named.items()
+    monkeypatch.setitem(registry._ENTRIES[kind], name, registry.Entry(kind, name, made, about, module=__name__))
+    return made

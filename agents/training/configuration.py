@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, make_plain, near, path_of, shown, whole_of
+from birthsim_env.registry import names
 
 STABLE_BASELINES = ("ppo", "sac", "tqc")
 ALGORITHMS = (*STABLE_BASELINES, "apg")
@@ -80,7 +80,7 @@ class TrainingSettings:
     def __post_init__(self) -> None:
         for name, allowed in (
             ("algorithm", ALGORITHMS),
-            ("sensors", tuple(SENSORS)),
+            ("sensors", tuple(names("sensors"))),
             ("randomize", RANDOMIZE),
             ("privileged", (True, False)),
             ("target", TARGETS),

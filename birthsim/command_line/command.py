@@ -6,7 +6,7 @@ import signal
 import sys
 import textwrap
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NoReturn, TypeVar, get_args, get_type_hints
 
@@ -14,7 +14,7 @@ from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Dict
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
-from birthsim.command_line.settings import CONTROLLER, Configured
+from birthsim.command_line.settings import CONTROLLER, ENV, HAND, SENSORS, Configured
 from birthsim.command_line.start import endings
 
 S = TypeVar("S")
@@ -72,16 +72,29 @@ def perform_with(name: str, settings: type[S], action: Callable[[S], None], exam
 
 
 def _named(settings: type) -> str:
-    """The controllers and policies that a command of these settings takes, for the end of its help; "" where it takes none."""
-    if not any(CONTROLLER in get_args(hint) for hint in get_type_hints(settings, include_extras=True).values()):
+    """What has a name and a command of these settings takes, for the end of its help; "" where it takes nothing of the kind."""
+    marks = [mark for hint in get_type_hints(settings, include_extras=True).values() for mark in _marks(hint)]
+    if not any(mark in marks for mark in (CONTROLLER, ENV, SENSORS, HAND)):
         return ""
-    from birthsim_env.registry import names  # loads what it lists
+    from birthsim_env.parts.scenarios import environment_id  # these load what is listed
+    from birthsim_env.registry import names
 
-    lists = {"controllers": names("controller"), "policies, as residual:circle": names("policy")}
-    return (
-        "\n".join(textwrap.fill(f"{title}: {', '.join(found)}", 80, break_on_hyphens=False) for title, found in lists.items())
-        + "\n\n"
-    )
+    lists: list[tuple[Parameter, str, Callable[[], list[str]]]] = [
+        (CONTROLLER, "controllers", lambda: names("controller")),
+        (CONTROLLER, "policies, as residual:circle", lambda: names("policy")),
+        (ENV, "environments", lambda: [environment_id(name) for name in names("scenario")]),
+        (SENSORS, "sensors", lambda: names("sensors")),
+        (HAND, "hands", lambda: names("hand")),
+    ]
+    paragraphs = [f"{title}: {', '.join(found())}" for mark, title, found in lists if mark in marks]
+    return "\n".join(textwrap.fill(one, 80, break_on_hyphens=False) for one in paragraphs) + "\n\n"
+
+
+def _marks(hint: Any) -> Iterator[Any]:
+    """What stands in an annotation, also within a choice or a list."""
+    for part in get_args(hint):
+        yield part
+        yield from _marks(part)
 
 
 def _read_and_act(app: App, settings: type, action: Callable[[Any], None]) -> None:

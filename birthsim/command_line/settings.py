@@ -6,7 +6,7 @@ that help comes at once.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -63,19 +63,33 @@ def check_cluster(_: type, name: str | None) -> None:
         raise ValueError("allowed: ray, or ray:ADDRESS of a running cluster, as ray:10.0.0.1:6379")
 
 
-Env = Annotated[str, Parameter(group=WORLD, metavar="ID", help="Environment.")]
+def named(kind: str, *more: str) -> Callable[[type, Any], None]:
+    """A validator of names, or of lists of them, that are registered under a ``kind`` or are one of ``more``."""
+
+    def check(_: type, given: Any) -> None:
+        from birthsim_env.registry import entry  # loads what it looks among
+
+        for name in given if isinstance(given, list) else [given]:
+            if name is not None and name not in more:
+                entry(kind, name, "".join(f", {one}" for one in more))
+
+    return check
+
+
+ENV = Parameter(group=WORLD, metavar="ID")
+Env = Annotated[str, ENV, Parameter(help="Environment.")]
 Seed = Annotated[int, whole(0, 2**32 - 1)]
 """A seed that NumPy and PyTorch take."""
-Kind = Literal["ideal", "lab", "honest"]
-"""The names of ``birthsim_env.parts.sensors.sensors.SENSORS``."""
-Sensors = Annotated[Kind, Parameter(group=WORLD, help="Sensor model.")]
+SENSORS = Parameter(group=WORLD, metavar="NAME", validator=named("sensors"))
+Sensors = Annotated[str, SENSORS, Parameter(help="Sensor model, one of those below.")]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
 RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
 MANY = Parameter(consume_multiple=True)
 """An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
+HAND = Parameter(group=WORLD, metavar="PART")
 NAMES = "the controllers below, with options as in 'admittance[learn=false]', or path/to/file.py:Class."
-"""Help of an option that names controllers; a command that has one lists them at the end of its help."""
+"""Help of an option that names controllers."""
 Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]
 Controllers = Annotated[
     list[str] | None,
@@ -131,10 +145,9 @@ class Parts(Configured):
     """CSV file of time, x, y, stiffness (s, m, m, N/m) of the setpoints; --reference takes the same file."""
     user_force: Annotated[
         str | None,
+        HAND,
         Parameter(
-            group=WORLD,
-            metavar="PART",
-            help="The hand: steps, sine, noise, guided, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
+            help="The hand: one of those below, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
             "birthsim_env.UserForce or of a function of time that returns (Fx, Fy).",
         ),
     ] = None

@@ -17,7 +17,7 @@ from baselines.identification.log_columns import LogOptions
 from baselines.identification.log_file import read_trial, write_trial
 from baselines.logs.writing import WRITERS
 from baselines.registry import make_controller
-from birthsim.command_line.settings import CONTROLLER, WORLD, Configured, Kind, RigFile, Seed, number, whole
+from birthsim.command_line.settings import CONTROLLER, SENSORS, Configured, RigFile, Seed, number, whole
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
@@ -30,7 +30,7 @@ ONLY_WITH = {
 
 @dataclass(kw_only=True)
 class Settings(Configured):
-    """Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and write the rig as
+    r"""Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and write the rig as
     TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.
     """
 
@@ -54,7 +54,7 @@ class Settings(Configured):
     """Duration of the proposed experiment, else 12 s."""
     controller: Annotated[str | None, CONTROLLER] = None
     """Controller of --simulate, else backstepping; for what a log tells it assumes the default rig."""
-    sensors: Annotated[Kind | None, Parameter(group=WORLD)] = None
+    sensors: Annotated[str | None, SENSORS] = None
     """Sensors of --simulate, else lab."""
     seed: Seed = 0
     """Of what is random."""

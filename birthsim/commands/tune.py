@@ -18,7 +18,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
@@ -32,7 +32,7 @@ from baselines.controller import Controller
 from baselines.registry import make_controller, split_options
 from baselines.tables import aligned
 from baselines.work.tasks import Task, result_of
-from birthsim.command_line.settings import CONTROLLER, WORLD, Kind, Parts, RigFile, Seed, Set, whole
+from birthsim.command_line.settings import CONTROLLER, SENSORS, Parts, RigFile, Seed, Set, named, whole
 from birthsim.command_line.worlds import check_world, with_options
 from birthsim_env.extras import installation
 from birthsim_env.files import own_folder, whole_results, write_json
@@ -181,7 +181,7 @@ class Settings(Parts):
     """Sets of gains to try."""
     seed: Seed = 0
     """Of the search."""
-    sensors: Annotated[Kind | Literal["both"], Parameter(group=WORLD, metavar="CHOICE")] = "both"
+    sensors: Annotated[str, SENSORS, Parameter(validator=named("sensors", "both"))] = "both"
     """Sensor model; both: ideal and lab."""
     start: Path | None = None
     """A gains.json, for trial 0, else the middle of every range."""

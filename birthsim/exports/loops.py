@@ -13,7 +13,7 @@ from agents.policy.shipped import loadable_names
 from baselines.controller import RESIDUAL
 from baselines.registry import compiled_names
 from baselines.tables import aligned
-from birthsim.command_line.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
+from birthsim.command_line.settings import CONTROL, CONTROLLER, ENV, MANY, SENSORS, Configured, RigFile, Seed
 from birthsim.exports import Form
 from birthsim_build.building import Report, build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import make_bundle, scenario_of
@@ -22,10 +22,8 @@ from birthsim_build.code.ptx import require_assembler
 from birthsim_build.code.targets import TARGETS
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.registry import register
+from birthsim_env.registry import names, register
 
 OLDEST = TARGETS["ptx"].processor
 """The GPU that PTX is for, and all after it."""
@@ -53,9 +51,9 @@ class Settings(Configured):
 
     to: Annotated[str, Parameter(choices=tuple(FORMS))]
     """Target; c: this processor."""
-    env: Annotated[list[str], MANY, Parameter(group=WORLD, metavar="ID...")] = field(default_factory=list)
+    env: Annotated[list[str], MANY, ENV, Parameter(metavar="ID...")] = field(default_factory=list)
     """Environments, else BirthSIM/Circle-v1; not for cortex-m7."""
-    sensors: Annotated[list[Kind], MANY, Parameter(group=WORLD)] = field(default_factory=list)
+    sensors: Annotated[list[str], MANY, SENSORS] = field(default_factory=list)
     """Sensor models, else ideal."""
     controller: Annotated[list[str], MANY, CONTROLLER, Parameter(metavar="NAME...")] = field(default_factory=list)
     """Compiled controllers, else backstepping."""
@@ -121,7 +119,7 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
     if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        return list(SCENARIOS), list(SENSORS), compiled_names(listed=True), _shipped()
+        return names("scenario"), names("sensors"), compiled_names(listed=True), _shipped()
     scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
     controllers = settings.controller or ([] if settings.policy else ["backstepping"])
     return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy

@@ -7,8 +7,8 @@ from birthsim_build.bundle import Bundle
 from birthsim_build.faces.module import HERE, Store, described, write_module
 from birthsim_build.layout import LAYOUT
 from birthsim_build.loops import ORDER, PAIRED_VALVES
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.registry import entries
 
 
 def write_javascript(bundle: Bundle, folder: Path) -> None:
@@ -30,7 +30,7 @@ def _index(bundle: Bundle, store: Store) -> dict[str, Any]:
     number, begins = store.number, store.rows
     scenarios: dict[str, Any] = {}
     for (scenario, sensors), world in bundle.worlds.items():
-        about = {"title": SCENARIOS[scenario].title, "duration": SCENARIOS[scenario].duration, "sensors": {}}
+        about = {"title": find_scenario(scenario).title, "duration": find_scenario(scenario).duration, "sensors": {}}
         of_sensors = scenarios.setdefault(scenario, about)["sensors"]
         of_sensors[sensors] = {"rows": begins(world.rows), "parts": {name: number(part) for name, part in world.parts.items()}}
     controllers: dict[str, dict[str, int]] = {}
@@ -40,7 +40,7 @@ def _index(bundle: Bundle, store: Store) -> dict[str, Any]:
     plant = {"rows": begins(bundle.plant.rows), "parts": {name: number(part) for name, part in bundle.plant.parts.items()}}
     return {
         "period": bundle.rig.electronics.control_period, "order": list(ORDER), "scenarios": scenarios,
-        "sensors": {name: kind.sampled for name, kind in SENSORS.items()}, "controllers": controllers, "plant": plant,
+        "sensors": {kind.name: kind.made.sampled for kind in entries("sensors")}, "controllers": controllers, "plant": plant,
         "one_valve": number(PAIRED_VALVES), "zero": begins(None), "parts": store.parts,
     }  # fmt: skip
 

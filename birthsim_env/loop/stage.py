@@ -211,3 +211,25 @@ class Stage:
 
 Part = Stage | Callable[[int], None]
 """A stage, or what a loop calls back with the number of the period: a user's own Python."""
+
+
+class Staged:
+    """What has one method that runs in every control period, and may have it compiled."""
+
+    def stage(self) -> Stage | None:
+        """That method, compiled into the closed loop; None where it is Python."""
+        return None
+
+
+def stage_of(part: Staged, method: str, stage: str = "stage") -> Stage | None:
+    """What a part's ``stage()`` returns, which is its ``method`` compiled; None where the method is Python.
+
+    It is Python where there is no stage, and for a class that derives from a compiled one and overrides ``method`` alone.
+    """
+    for kind in type(part).__mro__:
+        if stage in vars(kind):
+            found: Stage | None = getattr(part, stage)()
+            return found
+        if method in vars(kind):
+            break
+    return None

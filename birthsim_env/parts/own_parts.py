@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.parts.callables import arguments_of
-from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.points import Sampled, Through
 from birthsim_env.parts.references import LONGEST, Trajectory
@@ -21,6 +20,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.values import is_finite, path_of, problem, shown
+from birthsim_env.registry import entry, names
 from birthsim_env.tables.columns import columns, table_file
 
 COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
@@ -177,10 +177,11 @@ def hand_of(user_force: Any, varied: bool) -> UserForce:
 
     Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
     """
-    expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
-    path = path_of(user_force)
-    if path in HANDS:
-        return HANDS[path][varied]()
+    known, path = names("hand"), path_of(user_force)
+    expected = f"a birthsim_env.UserForce, {', '.join(map(repr, known))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
+    if path in known:
+        kind: type[UserForce] = entry("hand", path).made
+        return kind.varied() if varied else kind()
     if file := table_file(user_force):
         rows = columns("user_force", file, FORCE, tuple(FORCE))
         return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])

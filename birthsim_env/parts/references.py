@@ -14,7 +14,7 @@ import numpy as np
 from birthsim_env.loop.loop import sampled
 from birthsim_env.loop.rows import REFERENCE, Seen
 from birthsim_env.loop.signals import Motion
-from birthsim_env.loop.stage import Stage, table2
+from birthsim_env.loop.stage import Stage, Staged, table2
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.times import Timed
 from birthsim_env.physics.compiled import exact
@@ -33,7 +33,7 @@ LONGEST, SHORTEST = 1e6, 1e-3
 """s: times up to here, and what takes time takes no less."""
 
 
-class Trajectory:
+class Trajectory(Staged):
     """Where the end effector should be; derive from it to make a target of your own.
 
     Notes

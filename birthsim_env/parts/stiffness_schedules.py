@@ -11,7 +11,7 @@ import numpy as np
 from birthsim_env.loop.loop import sampled
 from birthsim_env.loop.rows import REFERENCE, Seen
 from birthsim_env.loop.signals import Motion, Setpoints
-from birthsim_env.loop.stage import Stage, numbers, table3
+from birthsim_env.loop.stage import Stage, Staged, numbers, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
 from birthsim_env.parts.times import Timed
@@ -25,7 +25,7 @@ SOFTEST, STIFFEST = 1e-3, 1e7
 """N/m: setpoints that can be asked for; steel rods of this size are as stiff."""
 
 
-class StiffnessSchedule:
+class StiffnessSchedule(Staged):
     """What stiffness is asked for, in phases.
 
     Sequences have one entry per phase: a number, or a range (low, high), from which every episode draws.

@@ -18,17 +18,17 @@ from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, is_compile
 from birthsim_build.stages import Period, enter_sensors, leave_sensors
 from birthsim_env.info import Info
 from birthsim_env.loop.rows import ASKED, WORLD
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Stage, stage_of
 from birthsim_env.loop.world import FurtherStates, plant_stage
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import SCENARIOS, Parts
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import Parts, find_scenario
+from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
-from birthsim_env.registry import names
+from birthsim_env.registry import entry, names
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
@@ -41,8 +41,8 @@ EPISODES = 16
 
 PATH_POINTS = 400
 
-WITHOUT = "only with birthsim live"
-"""What the page says of a controller that is not compiled."""
+WITHOUT = {"scenario": "only in Python", "sensors": "only in Python", "controller": "only with birthsim live"}
+"""What the page says of what is not compiled, or not in its code."""
 
 LEARNED = f"{RESIDUAL}:circle_apg"
 """The controller whose network the page exchanges for one that it learns (``learning.LEARNER``)."""
@@ -76,13 +76,13 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     chosen = [*names("controller", listed=True), *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period
     laws = {name: law for name in chosen if is_compiled(law := _made(name, rig))}
-    parts = {name: controller_parts(law) for name, law in laws.items()}
-    if functions is not None:
-        parts = {name: own for name, own in parts.items() if _needed(own) <= set(functions)}
-    controllers = [controller_choice(name) for name in chosen if name in parts or name not in others]
-    for one in controllers:
-        if one["name"] not in parts:
-            one["missing"] = WITHOUT
+    made: dict[str, dict[str, Any]] = {
+        "scenarios": {name: scenario(name) for name in names("scenario")},
+        "sensors": {name: sensors(name, rig) for name in names("sensors")},
+        "controllers": {name: controller_parts(law) for name, law in laws.items()},
+    }
+    parts = {kind: {name: own for name, own in group.items() if _serves(own, functions)} for kind, group in made.items()}
+    controllers = [controller_choice(name) for name in chosen if name in parts["controllers"] or name not in others]
     tree = {
         "rig": {
             "plant": plant_part(column), "clock": CLOCK, "inputs": INPUTS,
@@ -90,17 +90,19 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
             "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
         },
         "valves": {"two_valves": {}, "one_valve": {"valves": PAIRED_VALVES}},
-        "scenarios": {name: scenario(name) for name in SCENARIOS},
-        "sensors": {name: sensors(name, rig) for name in SENSORS},
-        "controllers": parts,
+        **parts,
     }  # fmt: skip
     if functions is None:  # those of worn valves and of tubes too
         worn, tubes = column.copy(), column.copy()
         worn[at.DEADBAND], tubes[at.TUBE_RATE] = 0.01, 100.0
         functions = sorted(_needed([tree, plant_part(worn), plant_part(tubes)]))
     store, hello = Store(functions), greeting(rig, controllers)
+    for kind, group in (("scenario", "scenarios"), ("sensors", "sensors"), ("controller", "controllers")):
+        for one in hello["choices"][kind]:
+            if one["name"] not in parts[group]:
+                one["missing"] = WITHOUT[kind]
     for one in hello["choices"]["scenario"]:
-        if problem := _problem(one["name"], rig):
+        if "missing" not in one and (problem := _problem(one["name"], rig)):
             one |= {"missing": "not with this rig", "about": problem}
     numbers = _numbered(tree, store)
     content = {
@@ -121,10 +123,11 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         },
         "parts": numbers,
         "scenarios": {
-            name: {"duration": one.duration, "path": path_of(begun(name), one.duration)} for name, one in SCENARIOS.items()
+            name: {"duration": (lasts := find_scenario(name).duration), "path": path_of(begun(name), lasts)}
+            for name in parts["scenarios"]
         },
-        "sampled": {name: kind.sampled for name, kind in SENSORS.items()},
-        "damped": {name: "damping_factor" in laws[name].COMMAND_OPTIONS for name in parts},
+        "sampled": {name: entry("sensors", name).made.sampled for name in parts["sensors"]},
+        "damped": {name: "damping_factor" in laws[name].COMMAND_OPTIONS for name in parts["controllers"]},
         "numbers": NUMBERS,
         "header": {
             "format": FORMAT, "birthsim": birthsim_env.__version__, "rig": rig.to_dict(), "columns": list(FIELDS),
@@ -148,7 +151,7 @@ def rig_numbers(rig: Parameters) -> dict[str, Any]:
 
 def begun(name: str) -> Parts:
     """Target, hand and setpoints of a nominal scenario, which are the same in every episode."""
-    parts = SCENARIOS[name].nominal()
+    parts: Parts = find_scenario(name).nominal()
     for part, channel in zip(parts, ("reference", "user_force", "stiffness"), strict=True):
         part.prepare(1)  # type: ignore[attr-defined]
         part.begin(0, stream(0, 0, channel))  # type: ignore[attr-defined]
@@ -156,9 +159,11 @@ def begun(name: str) -> Parts:
 
 
 def scenario(name: str) -> dict[str, Part]:
-    """A scenario's parts."""
-    target, force, setpoints = (_part(part.stage()) for part in begun(name))  # type: ignore[union-attr]
-    return {"target": target, "setpoints": setpoints, "hand": force}
+    """A scenario's parts; none where one of them is not compiled."""
+    target, force, setpoints = begun(name)
+    named = {"target": (target, "sample"), "setpoints": (setpoints, "sample"), "hand": (force, "force")}
+    stages = {kind: stage for kind, part in named.items() if (stage := stage_of(*part))}
+    return {kind: _part(stage) for kind, stage in stages.items()} if len(stages) == len(named) else {}
 
 
 def path_of(scenario: Parts, duration: float) -> list[list[float]]:
@@ -172,7 +177,7 @@ def _problem(name: str, rig: Parameters) -> str:
     """Why a rig cannot do a scenario: its target leaves the workspace, or the rig cannot carry its weight there."""
     target, _, setpoints = begun(name)
     try:
-        start = checked_start(target, setpoints, np.array([0]), 1, SCENARIOS[name].duration, rig)
+        start = checked_start(target, setpoints, np.array([0]), 1, find_scenario(name).duration, rig)
         require_carried(start[:2], rig)
     except ValueError as error:
         if name == "probe":  # with which the page opens
@@ -182,15 +187,21 @@ def _problem(name: str, rig: Parameters) -> str:
 
 
 def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
-    """The parts of a sensor model, for each episode; the stages have a clock of their own."""
-    model, period, episodes = SENSORS[name](rig.electronics, 1), rig.electronics.control_period, []  # type: Any, float, list[Any]
+    """The parts of a sensor model, for each episode; none where it is not compiled. The stages have a clock of their own."""
+    model: SensorModel = entry("sensors", name).made(rig.electronics, 1)
+    period, episodes = rig.electronics.control_period, list[Any]()
     enter, leave = (Stage(one, Period.numbers(period=period), INPUT_MEMORY) for one in (enter_sensors, leave_sensors))
     for episode in range(EPISODES):
         model.begin(0, stream(0, episode, "sensors"))
-        own = {"sensors": model.stage(), **({"board": model.board_stage()} if hasattr(model, "board_stage") else {})}
-        for stage in own.values():
+        own = {"sensors": stage_of(model, "measure")}
+        if model.has_board:
+            own["board"] = stage_of(model, "put_out", "board_stage")
+        stages = {kind: stage for kind, stage in own.items() if stage}
+        if len(stages) < len(own):
+            return []
+        for stage in stages.values():
             stage.tables = tuple(table.copy() for table in stage.tables)
-        episodes.append({kind: _part(enter, stage, leave) for kind, stage in own.items()})
+        episodes.append({kind: _part(enter, stage, leave) for kind, stage in stages.items()})
     return episodes
 
 
@@ -224,6 +235,11 @@ def _part(*own: Stage) -> Part:
 def _needed(tree: Any) -> set[str]:
     """Names of the functions that parts need."""
     return {function_name(stage) for part in _all(tree) for stage in part.stages}
+
+
+def _serves(tree: Any, functions: list[str] | None) -> bool:
+    """Whether there are parts, and code that has ``functions`` has theirs."""
+    return bool(tree) and (functions is None or _needed(tree) <= set(functions))
 
 
 def _all(tree: Any) -> Iterator[Part]:

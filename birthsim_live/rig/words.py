@@ -6,7 +6,6 @@ from typing import Any
 
 import birthsim_env
 from baselines.controller import RESIDUAL
-from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.registry import entries
 
 FIGURES = {
@@ -37,12 +36,8 @@ CHOICES = {
         "two_valves": "Two valves a cylinder, one for each chamber: force and stiffness are free of each other.",
         "one_valve": "One 5/3 valve a cylinder: what fills one chamber empties the other.",
     },
-    "sensors": {
-        "ideal": "Every quantity is known exactly and at once.",
-        "lab": "A tracker that samples, is late and noisy, and noisy pressure cells.",
-        "honest": "Tracker, cells and force sensor with every error that data sheets name.",
-    },
-    "scenario": {name: scenario.about for name, scenario in SCENARIOS.items()},
+    "sensors": {model.name: model.about for model in entries("sensors")},
+    "scenario": {scenario.name: scenario.about for scenario in entries("scenario")},
 }
 """Setting -> choice -> what it is; controllers say it where they are registered."""
 

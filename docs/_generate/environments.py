@@ -8,15 +8,15 @@ import gymnasium
 import birthsim_env
 from birthsim_env import observation, reward
 from birthsim_env.assembly import DEFAULTS
-from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, find_scenario
+from birthsim_env.registry import entry, names
 
 
 def environments() -> str:
     """A card per id, what all share, then a section per id."""
-    cards = "\n\n".join(_card(name) for name in SCENARIOS)
-    return "\n\n".join([f":::{{container}} cards\n{cards}\n:::", _shared(), *(_section(name) for name in SCENARIOS)])
+    cards = "\n\n".join(_card(name) for name in names("scenario"))
+    return "\n\n".join([f":::{{container}} cards\n{cards}\n:::", _shared(), *(_section(name) for name in names("scenario"))])
 
 
 def _picture(scenario: str) -> str:
@@ -28,7 +28,7 @@ def _picture(scenario: str) -> str:
 
 def _card(scenario: str) -> str:
     anchor = re.sub(r"[^a-z0-9-]", "", environment_id(scenario).lower())
-    return f"[{_picture(scenario)}](#{anchor}) **{scenario.capitalize()}.** {SCENARIOS[scenario].about}"
+    return f"[{_picture(scenario)}](#{anchor}) **{scenario.capitalize()}.** {entry('scenario', scenario).about}"
 
 
 def _shared() -> str:
@@ -76,16 +76,15 @@ def _shared() -> str:
 
 
 def _section(scenario: str) -> str:
-    name = environment_id(scenario)
+    name, made = environment_id(scenario), find_scenario(scenario)
     facts = {
-        "experiment": _experiment(name),
-        "what one meets": SCENARIOS[scenario].about,
-        "duration": f"{SCENARIOS[scenario].duration:g} s, {round(SCENARIOS[scenario].duration / 0.01)} steps of 10 ms",
+        "experiment": made.experiment,
+        "what one meets": entry("scenario", scenario).about,
+        "duration": f"{made.duration:g} s, {round(made.duration / 0.01)} steps of 10 ms",
         **_spaces(name),
         **{f"{kind}, controller inside": text for kind, text in _spaces(environment_id(scenario, "Residual")).items()},
     }
     rows = [f"| {fact} | {text} |" for fact, text in facts.items()]
-    made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]
     return "\n".join(
         [
             f"## `{name}`",
@@ -99,16 +98,10 @@ def _section(scenario: str) -> str:
             "What it is made of, as it stands and as `randomize` draws it (SI units):",
             "",
             "```py",
-            "\n\n".join(made).rstrip(),
+            inspect.getsource(type(made)).rstrip(),
             "```",
         ]
     )
-
-
-def _experiment(name: str) -> str:
-    """What the contract of the environment says of an id."""
-    (row,) = re.findall(rf"^\s*\| `{name}` \| (.*) \| \d+ \|$", BirthSIMEnv.__doc__ or "", re.MULTILINE)
-    return row
 
 
 def _spaces(name: str) -> dict[str, str]:

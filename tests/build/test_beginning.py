@@ -15,8 +15,8 @@ from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
 from birthsim_env.loop.loop import Loop
 from birthsim_env.parts.hands.contractions import Contractions
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.registry import names
 from tests.build.targets import assert_fusing_changes_nothing, need_threads
 from tests.build.test_device import assert_equal, assert_same_run
 from tests.build.test_threads import assert_exact
@@ -34,7 +34,7 @@ OPTIONS = Parameters().replace(
 )
 
 CASES = {
-    **{f"{name} {sensors}": (name, {"sensors": sensors}) for name in SCENARIOS for sensors in SENSORS},
+    **{f"{name} {sensors}": (name, {"sensors": sensors}) for name in names("scenario") for sensors in names("sensors")},
     **{hand: ("probe", {"user_force": hand}) for hand in ("sine", "noise", "guided")},
     "options": ("circle", {"parameters": OPTIONS, "sensors": "lab"}),
     "options, honest, no force sensor": ("forceps", {"parameters": OPTIONS, "sensors": "honest", "force_sensor": False}),

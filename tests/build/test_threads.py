@@ -1,5 +1,6 @@
 """Programs of lanes: the code of a thread, run here, computes the bits of ``Loop``; as PTX it has nothing that could differ."""
 
+import itertools
 import json
 import re
 
@@ -16,11 +17,9 @@ from birthsim_build.device.loops import controlled, pieces_of
 from birthsim_build.device.machine import Host
 from birthsim_build.device.program import key_of
 from birthsim_build.layout import LAYOUT
-from birthsim_env import Parameters
+from birthsim_env import Parameters, registry
 from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
 from tests.build.targets import assert_fusing_changes_nothing, fill, need_threads
 
 SEED = 2_000_000
@@ -121,7 +120,8 @@ def test_a_hundred_thousand_threads():
 @pytest.mark.slow
 def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
     """Of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
-    made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
+    pairs = itertools.product(registry.names("scenario"), registry.names("sensors"))
+    made = [begun(2, scenario, sensors=sensors) for scenario, sensors in pairs]
     laws = (*compiled_names(listed=True), "residual:circle")
     made += [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
     functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}

@@ -1,6 +1,5 @@
 """The settings of commands: the same by option and by TOML, and names that help lists without an import."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -11,12 +10,11 @@ import tomli_w
 from agents.residual.settings import IMPEDANCES
 from agents.training.configuration import ALGORITHMS
 from birthsim.command_line.command import program
-from birthsim.command_line.settings import RANDOMIZE, Configured, Kind, Randomize
+from birthsim.command_line.settings import RANDOMIZE, Configured, Randomize
 from birthsim.commands import train
 from birthsim.main import COMMANDS, load
 from birthsim_env.parts.drawn.randomization import RANDOMIZE as WORDS
-from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.registry import entries, names
 from tests.console import assert_says, call
 
@@ -45,7 +43,7 @@ def test_an_example_is_read_and_says_the_same_as_toml(name, tmp_path):
     ("content", "said"),
     [
         ("sensor = 'lab'", ("sensor", "--sensors", "own.toml")),
-        ("sensors = 'la'", ("sensors", "la", "ideal", "lab", "honest", "own.toml")),
+        ("sensors = 'none'", ("sensors", "none", "ideal", "lab", "honest", "own.toml")),
         ("seed = -1", ("seed", "'-1'", "a whole number from 0 to 4294967295")),
         ("seed = 3.0", ("seed", "'3.0'", "a whole number from 0 to 4294967295")),
         ("seed = [1, 2]", ("seed", "own.toml")),
@@ -72,13 +70,19 @@ def test_what_is_typed_counts_more_than_toml(tmp_path):
 
 
 def test_choices_that_help_lists_are_those_that_there_are(monkeypatch, capsys):
-    assert set(get_args(Kind)) == {"ideal", "lab", "honest"} <= set(SENSORS)  # other tests register another one
     assert set(get_args(get_args(Randomize)[0])) == set(RANDOMIZE)
     assert set(RANDOMIZE.values()) == set(WORDS)
     hints = get_type_hints(train.Settings)
     for option, known in (("algorithm", ALGORITHMS), ("impedance", IMPEDANCES)):
         assert set(get_args(get_args(hints[option])[0])) == set(known)
     _, printed, _ = call("run", monkeypatch, capsys, "--help")
-    assert [name for name in HANDS if not re.search(rf" {name}[,;]", printed)] == []
-    listed = [name for part in printed.split("controllers: ")[1].split("\nexample")[0].split("\n") for name in part.split(", ")]
-    assert [name for name in (*names("controller"), *names("policy")) if name not in " ".join(listed)] == []
+    listed = " ".join(printed.split("controllers: ")[1].split("\nexample")[0].split())
+    known = [name for kind in ("controller", "policy", "sensors", "hand") for name in names(kind)]
+    assert [name for name in (*known, *map(environment_id, names("scenario"))) if name not in listed] == []
+
+
+@pytest.mark.parametrize("name", ["run", "tune"])
+def test_a_sensor_model_that_there_is_not_is_refused_with_those_that_there_are(name, monkeypatch, capsys):
+    code, _, said = call(name, monkeypatch, capsys, *COMMANDS[name].example.split(), "--sensors", "none")
+    assert code == 2
+    assert_says(("sensors", *names("sensors")), said)

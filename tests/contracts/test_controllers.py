@@ -12,7 +12,6 @@ from agents.residual.settings import NO_LAW
 from baselines.registry import LIMITED, known_options, make_controller, resolved, uncontrolled_names
 from baselines.staged import COMMAND_OPTIONS
 from birthsim_env import Parameters, Reference
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.registry import names
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
@@ -23,7 +22,7 @@ POLICIES = [f"residual[policy={name}]" for name in names("policy")]
 CHOICES = [name for name in names("controller") if name != "admittance"]  # which is admittance-adaptive
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 NAMES = [*CHOICES, IDENTIFIED, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
-CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name in NAMES for sensors in SENSORS]
+CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name in NAMES for sensors in names("sensors")]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 CONTROLLED = [name for name in NAMES if name not in uncontrolled_names()]
 

@@ -16,10 +16,9 @@ from stable_baselines3.common.env_checker import check_env as stable_baselines_c
 import birthsim_env
 from agents.residual.settings import IMPEDANCES, LAWS
 from birthsim_env.info import FIELDS
-from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 from birthsim_env.reward import REWARD_TERMS
 from tests.physics.plant.test_options import EACH, WORTH
 
@@ -27,10 +26,10 @@ CIRCLE, RESIDUAL, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1", 
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
 WORLDS = {
     **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True})
-       for name, sensors in itertools.product(SCENARIOS, SENSORS)},
-    **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in HANDS},
+       for name, sensors in itertools.product(names("scenario"), names("sensors"))},
+    **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in names("hand")},
     **{f"law {law} {sensors}": (RESIDUAL, {"law": law, "sensors": sensors, "randomize": True})
-       for law, sensors in itertools.product(LAWS, SENSORS)},
+       for law, sensors in itertools.product(LAWS, names("sensors"))},
     **{f"impedance {mode}": ("BirthSIM/DystociaResidual-v1", {"impedance": mode}) for mode in IMPEDANCES},
     **{f"option {name}": (CIRCLE, {"parameters": Parameters().replace(changes)}) for name, changes in EACH.items()},
     "flows": (FORCEPS, {"action_mode": "flow", "valves": "one_valve"}),
@@ -74,10 +73,10 @@ def assert_lane(infos, lane, info, where=""):
 IDS = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/"))
 FACES = [
     dict(zip(("action_mode", "valves", "sensors"), face, strict=True))
-    for face in itertools.product(("valve", "flow"), ("two_valves", "one_valve"), SENSORS)
+    for face in itertools.product(("valve", "flow"), ("two_valves", "one_valve"), names("sensors"))
 ]
 CHECKED = [(CIRCLE, face) for face in FACES] + [
-    (name, {"sensors": sensors, "randomize": True}) for name in IDS for sensors in SENSORS
+    (name, {"sensors": sensors, "randomize": True}) for name in IDS for sensors in names("sensors")
 ]
 
 
@@ -90,7 +89,7 @@ def test_both_checkers_find_nothing_to_say(name, arguments, monkeypatch):
 
 def test_importing_again_neither_warns_nor_changes_the_registry():
     before = {name: gymnasium.registry[name] for name in IDS}
-    assert set(IDS) == {environment_id(name, kind) for name in SCENARIOS for kind in ("", "Residual")}
+    assert set(IDS) == {environment_id(name, kind) for name in names("scenario") for kind in ("", "Residual")}
     importlib.reload(birthsim_env)
     assert all(gymnasium.registry[name] is spec for name, spec in before.items())
 

@@ -12,10 +12,9 @@ import pytest
 
 from baselines import evaluate, make_controller
 from baselines.staged import driving
-from birthsim_env import Parameters
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env import Parameters, registry
 
+KINDS = ("scenario", "sensors")
 PLUGINS = Path(__file__).parent / "plugins"
 PROBE = "BirthSIM/Probe-v2"
 RIG = Parameters()
@@ -24,7 +23,8 @@ RIG = Parameters()
 @pytest.fixture(autouse=True)
 def imports(monkeypatch):
     """Plugins are imported by their names, as a user's are; what they register is gone after a test."""
-    tables = SCENARIOS, SENSORS, gymnasium.registry
+    assert all(registry.names(kind) for kind in KINDS), "all of the package's own are there"
+    tables = *(registry._ENTRIES[kind] for kind in KINDS), registry._WHERE, gymnasium.registry
     kept = [dict(table) for table in tables]
     monkeypatch.syspath_prepend(PLUGINS)
     yield
@@ -75,14 +75,15 @@ def test_a_sensor_model_shows_the_steps_of_its_own():
 
 
 def test_a_scenario_has_an_id():
-    env = gymnasium.make("scenario:Mine/Stroll-v0")
+    env = gymnasium.make("scenario:BirthSIM/Stroll-v0")
+    assert "BirthSIM/StrollResidual-v0" in gymnasium.registry
     _, info = env.reset(seed=0)
     assert info["target"][0] == pytest.approx(0.48)
     for _ in range(220):
         _, _, _, _, info = env.step(np.zeros(4, np.float32))
     assert info["target"][0] == pytest.approx(0.52)
     assert len(env.unwrapped.simulation._loop._pieces) == 1, "all of it is compiled"
-    result = evaluated("backstepping", "scenario:Mine/Stroll-v0")
+    result = evaluated("backstepping", "BirthSIM/Stroll-v0")
     assert result.lost == [False] * 3
     assert len(result.traces[0]) == 300, "s of the scenario, at 100 Hz"
     assert max(result.metrics["error_max_x"]) < 5.0

@@ -19,13 +19,14 @@ from agents.training.configuration import TrainingSettings, load_configuration
 from baselines import evaluate
 from baselines.registry import known_options, make_controller
 from birthsim_env import Measurement, Parameters, Reference
-from birthsim_env.parts.hands import contractions, moving_hands, user_forces
-from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
+from birthsim_env.parts.hands import contractions, sine, steps, user_forces
+from birthsim_env.parts.sensors.ideal import IdealSensors
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import checked_count, checked_number, whole_of
 from birthsim_env.registry import names
 from birthsim_env.vector_env import BirthSIMVectorEnv
+from tests.registered import registered
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -50,7 +51,7 @@ NUMBERS = {
     "duration": (lambda x: stepped(duration=x), 1),
     "stiffness": (lambda x: stepped(stiffness=x), 2000),
     "randomize": (lambda x: stepped(randomize={"mechanics.mass": (x, 5.0)}), 4),
-    "amplitude": (lambda x: stepped(user_force=moving_hands.Sine(x)), 4),
+    "amplitude": (lambda x: stepped(user_force=sine.Sine(x)), 4),
     "begins": (lambda x: stepped(user_force=user_forces.Ramp(begins=x), duration=4.0), 1),
     "radius": (lambda x: stepped(reference=birthsim_env.Circle(radius=(x, 0.05))), 0.0),
     "times": (
@@ -70,7 +71,7 @@ COUNTS = {
     "num_threads": (lambda n: stepped(num_threads=n), 2),
     "max_episode_steps": (lambda n: gymnasium.make_vec(CIRCLE, num_envs=2, max_episode_steps=n).steps, 3),
     "picture_size": (lambda n: stepped(picture_size=(n, n)), 640),
-    "repeats": (lambda n: stepped(user_force=user_forces.AlternatingSteps(repeats=n)), 2),
+    "repeats": (lambda n: stepped(user_force=steps.AlternatingSteps(repeats=n)), 2),
     "count": (lambda n: stepped(user_force=contractions.Contractions(count=n)), 2),
     "reset": (lambda n: gymnasium.make_vec(CIRCLE, num_envs=2).reset(seed=n)[0], 3),
     "reset, a list": (lambda n: gymnasium.make_vec(CIRCLE, num_envs=2).reset(seed=[n, None])[0][0], 3),
@@ -260,7 +261,7 @@ class Sensors(IdealSensors):
 
 @pytest.mark.parametrize("kind", _arrays((1,)))
 def test_sensors_of_ones_own_tell_numbers(kind, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", Sensors)
+    registered(monkeypatch, Sensors, sensors="own")
     for name, shape in (("time", (2,)), ("position", (2, 2)), ("pressures", (4, 2)), ("acceleration", (2, 2))):
         monkeypatch.setattr(Sensors, "name", name)
         monkeypatch.setattr(Sensors, "odd", _arrays(shape)[kind])

@@ -18,8 +18,9 @@ from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, Stiffnes
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
-from birthsim_env.parts.hands.moving_hands import Noise
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
+from birthsim_env.parts.hands.noise import Noise
+from birthsim_env.parts.hands.steps import AlternatingSteps
+from birthsim_env.parts.hands.user_forces import Pulls, Ramp
 from birthsim_env.physics.rig.parameters import DECLARED
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.vector_env import BirthSIMVectorEnv
@@ -85,10 +86,10 @@ TABLE = [
         for row in [
             (both, "action_mode", ("voltage", None), "'valve', 'flow'"),
             (both, "valves", ("three",), "'two_valves', 'one_valve'"),
-            (both, "sensors", ("magnetic", ["lab"]), "'ideal', 'lab'"),
+            (both, "sensors", ("magnetic", ["lab"]), "ideal, lab"),
             (both, "randomize", ("all", None, 1), "'plant', 'scenario'"),
             (both, "randomize", ("sensors",), "'honest'"),
-            (both, "scenario", ("birth",), "'circle'"),
+            (both, "scenario", ("birth",), "circle, probe"),
             (both, "reference", ("circle", (0.5, 0.0)), "a birthsim_env.Trajectory"),
             (both, "user_force", (30.0, (0.0, 1.0), "soft"), "a birthsim_env.UserForce"),
             (both, "stiffness", ("stiff", INF), "StiffnessSchedule"),
@@ -196,7 +197,7 @@ TABLE = [
             (partial(both, law="admittance"), "impedance", ("variable_kp",), "'fixed', law = 'admittance' has no impedance"),
             (both, "policy_period", (0.0105,), "a multiple of the control period 0.001 s"),
             (both, "policy_period", (-0.01, "fast"), "more than 0"),
-            (both, "sensors", ("none",), "'ideal', 'lab'"),
+            (both, "sensors", ("none",), "ideal, lab"),
         ]
     ),
     (AdmittanceController, "identified", (True,), "force_sensor is False"),

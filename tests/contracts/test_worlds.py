@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.registry import names
 
 ARGUMENTS = {
     "action_mode": ("valve", "flow"), "valves": ("two_valves", "one_valve"), "sensors": ("ideal", "lab"),
-    "randomize": (False, True, "plant", "scenario"), "user_force": (None, *HANDS), "policy_period": (0.001, 0.01, 0.04),
+    "randomize": (False, True, "plant", "scenario"), "user_force": (None, *names("hand")), "policy_period": (0.001, 0.01, 0.04),
     "duration": (None, 0.1, 3.0), "autoreset_mode": ("NextStep", "SameStep"),
 }  # fmt: skip
 WORLDS = st.fixed_dictionaries(
     {
-        "scenario": st.sampled_from(sorted(SCENARIOS)),
+        "scenario": st.sampled_from(sorted(names("scenario"))),
         "num_envs": st.integers(1, 5),
         "seed": st.integers(0, 2**63),
         "steps": st.integers(1, 60),
@@ -74,7 +74,7 @@ PLAIN = [
         "steps": 30,
         "arguments": {"sensors": "lab", "randomize": True, "duration": 0.2, "user_force": "guided"},
     }
-    for name in SCENARIOS
+    for name in names("scenario")
 ]
 
 

@@ -8,30 +8,30 @@ import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
 from birthsim_env import FixedTarget, ForceProfile, Parameters, StiffnessSchedule
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
-from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.honest import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
-from birthsim_env.parts.sensors.sensors import SENSORS
 from lab.studies.haptics.worlds import no_hand, resting
 from lab.studies.stability.rig_port import RigPort
 from tests.env.test_loop import OwnValves, assert_same, course, own
 from tests.parts.test_honest_sensors import OFF
+from tests.registered import registered
 
 CIRCLE = "BirthSIM/Circle-v1"
 
 
-class AskedForAll:
+class AskedForAll(HonestSensors):
     """Sensors whose measurements and control board are asked in Python."""
 
-    sampled, drawn = True, HonestSensors.drawn
+    def measure(self, *seen):
+        return super().measure(*seen)
 
-    def __init__(self, *setting):
-        honest = HonestSensors(*setting)
-        self.begin, self.measure, self.put_out, self.vary = honest.begin, honest.measure, honest.put_out, honest.vary
+    def put_out(self, *commanded):
+        return super().put_out(*commanded)
 
 
 @pytest.mark.parametrize("part", [own(HonestSensors, "measure"), AskedForAll, "actuation"])
 def test_a_stop_for_python_changes_no_bit(part, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", part)
+    registered(monkeypatch, HonestSensors if part == "actuation" else part, sensors="own")
     rig = Parameters().replace({"electronics.missed_periods": 0.2})
     setting = {"num_envs": 3, "parameters": rig, "randomize": True}
     changes = {"sensors": "own"} if part != "actuation" else {"actuation": OwnValves("two_valves"), "sensors": "honest"}

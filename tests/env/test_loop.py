@@ -12,8 +12,11 @@ import agents  # noqa: F401  registers the residual environments
 from birthsim_env import Circle, StiffnessSchedule
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.parts.actuation import ValveActuation
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, ForceProfile
-from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
+from birthsim_env.parts.hands.steps import AlternatingSteps
+from birthsim_env.parts.hands.user_forces import ForceProfile
+from birthsim_env.parts.sensors.ideal import IdealSensors
+from birthsim_env.registry import names
+from tests.registered import registered
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 
@@ -69,7 +72,7 @@ def schedule(kind=StiffnessSchedule):
     ids="+".join,
 )
 def test_a_stop_for_a_users_python_changes_no_bit(changed, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", own(IdealSensors, "measure"))
+    registered(monkeypatch, own(IdealSensors, "measure"), sensors="own")
     compiled = {"reference": Circle(), "user_force": AlternatingSteps(repeats=1), "stiffness": schedule()}
     one, other = (gymnasium.make_vec(CIRCLE, num_envs=3, **arguments) for arguments in (compiled, {**compiled, **changed}))
     assert_same(course(one), course(other))
@@ -77,7 +80,7 @@ def test_a_stop_for_a_users_python_changes_no_bit(changed, monkeypatch):
     assert pieces[0] == 1 < pieces[1], "what is compiled is one piece; a user's part stands between others"
 
 
-@pytest.mark.parametrize("sensors", SENSORS)
+@pytest.mark.parametrize("sensors", names("sensors"))
 @pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
 def test_threads_change_no_bit(name, sensors):
     runs = [

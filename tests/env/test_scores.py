@@ -11,11 +11,11 @@ from baselines import evaluate, make_controller
 from baselines.bench.measures import DISCOUNTS
 from birthsim_env import Parameters, Reference
 from birthsim_env.loop.rows import World
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.reward import Tally, add
 from birthsim_env.scores import ROLES, normalized_score, reference_scores
 
-IDS = [environment_id(name) for name in SCENARIOS]
+IDS = [environment_id(name) for name in studied_scenarios()]
 PROBE = environment_id("probe")
 """For three of its seven seconds nothing pushes. Shut valves stand on the target then, the paper's law hunts: on drawn rigs
 they pay more than it, though their settled error is larger."""

@@ -8,7 +8,7 @@ import pytest
 
 from baselines.estimation.observers import RELUCTANCE, REST_BANDWIDTH, REST_TIME
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian

@@ -11,8 +11,8 @@ import agents  # noqa: F401  registers the residual environments
 from baselines.registry import make_controller
 from baselines.staged import driving
 from birthsim_env.gradients.recorder import Recorder
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 from lab.studies.gradients.checks import CONTROLLERS
 from lab.studies.gradients.loops import SMOOTH, begun, compared
 
@@ -32,7 +32,7 @@ SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 LAW_LOOPS = {
     f"{name}, {sensors}": {"world": "BirthSIM/Circle-v1", "controller": name, "sensors": sensors}
-    for name, sensors in zip(CONTROLLERS, itertools.cycle(SENSORS), strict=False)
+    for name, sensors in zip(CONTROLLERS, itertools.cycle(names("sensors")), strict=False)
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
 FAST = ("a hand that feels",)

@@ -9,7 +9,7 @@ import pytest
 
 from baselines.bench import probes
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, jacobian

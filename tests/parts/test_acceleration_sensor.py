@@ -9,10 +9,12 @@ import pytest
 from scipy.signal import lfilter
 
 from birthsim_env.loop.stage import Stage
-from birthsim_env.parts.sensors.honest_sensors import HonestSensors
-from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors, LabSensors, ideal_stage
+from birthsim_env.parts.sensors.honest import HonestSensors
+from birthsim_env.parts.sensors.ideal import IdealSensors, ideal_stage
+from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.parts.test_honest_sensors import OFF, assert_uniform, board, swing, watch
+from tests.registered import registered
 
 EXACT = {**OFF, "acceleration_noise": 0.0, "acceleration_bias": 0.0, "acceleration_gain_error": 0.0}
 MODELS = (LabSensors, HonestSensors)
@@ -49,7 +51,7 @@ class InTheLoop(Untold):
 
 @pytest.mark.parametrize("model", [Untold, InTheLoop])
 def test_own_sensors_that_tell_none_are_refused_where_the_rig_has_one(model, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", model)
+    registered(monkeypatch, model, sensors="own")
     gymnasium.make("BirthSIM/Circle-v1", sensors="own").reset(seed=0)
     env = gymnasium.make("BirthSIM/Circle-v1", sensors="own", parameters="examples/acceleration_sensor_rig.toml")
     with pytest.raises(ValueError, match=rf"sensors {model.__name__} tell no acceleration; allowed: \(2, 1\) m/s2, since"):

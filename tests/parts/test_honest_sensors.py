@@ -9,9 +9,9 @@ from scipy.special import j0
 
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.honest import HonestSensors
+from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
-from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.electronics import Electronics
 from tests.console import ROOT
 

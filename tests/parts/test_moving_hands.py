@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from birthsim_env.parts.hands.moving_hands import CALM, HANDS, Guided, Noise, Sine
+from birthsim_env.parts.hands.guided import CALM, Guided
+from birthsim_env.parts.hands.noise import Noise
+from birthsim_env.parts.hands.sine import Sine
+from birthsim_env.registry import names
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -96,7 +99,15 @@ def test_asked_again_it_says_the_same_and_a_new_episode_takes_hold_anew():
     np.testing.assert_array_equal(later[0, :, 1], 0.0)
 
 
-@pytest.mark.parametrize("name", HANDS)
+@pytest.mark.parametrize("name", names("hand"))
+def test_every_registered_hand_pushes_as_it_is_and_drawn(name):
+    for randomize in (False, True):
+        env = gymnasium.make_vec(CIRCLE, num_envs=2, user_force=name, randomize=randomize)
+        env.reset(seed=4)
+        assert max(np.abs(env.step(np.zeros((2, 4)))[4]["user_force"]).max() for _ in range(250)) > 0.5
+
+
+@pytest.mark.parametrize("name", ["steps", "sine", "noise", "guided"])
 @pytest.mark.parametrize("randomize", [False, True])
 def test_every_lane_is_pushed_and_by_a_hand_of_its_own_where_it_draws(name, randomize):
     env = gymnasium.make_vec(CIRCLE, num_envs=3, user_force=name, randomize=randomize, sensors="lab")

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from birthsim_env import Circle, FixedTarget, Parameters, Path, Trajectory
 from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.geometry import end_effector
+from birthsim_env.registry import names
 from lab.studies.fuzz.odd_rigs import odd_rig
 
 RIG = Parameters()
@@ -41,13 +42,13 @@ def assert_consistent(trajectory, times, step=1e-4):
         np.testing.assert_allclose(at[row + 2], slope, atol=1e-5 * size + 1e-9 / step, err_msg=f"row {row + 2}")
 
 
-BUILT_IN = [(name, kind) for name in SCENARIOS for kind in ("nominal", "varied")]
+BUILT_IN = [(name, kind) for name in names("scenario") for kind in ("nominal", "varied")]
 
 
 @pytest.mark.parametrize(("name", "kind"), BUILT_IN)
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_derivatives_of_every_scenario_fit_together(name, kind, seed):
-    scenario = SCENARIOS[name]
+    scenario = find_scenario(name)
     trajectory = prepared(getattr(scenario, kind)()[0], seed=seed)
     times = np.linspace(0.003, scenario.duration - 0.003, 1201)
     if isinstance(trajectory, Path):
@@ -100,7 +101,7 @@ def boundary_margin(x, y):
 @pytest.mark.parametrize("kind", ["nominal", "varied"])
 def test_descent_is_ten_centimetres_of_line_and_the_arc_of_the_design(kind):
     lanes = 300 if kind == "varied" else 1
-    path = prepared(getattr(SCENARIOS["descent"], kind)()[0], lanes)
+    path = prepared(getattr(find_scenario("descent"), kind)()[0], lanes)
     length, radius, angle = path._own[3], path._own[4], np.degrees(path._own[5])
     np.testing.assert_allclose(length, 0.10)
     for values, low, high in ((radius, 0.06, 0.08), (angle, 70.0, 90.0)):
@@ -114,9 +115,9 @@ def test_descent_is_ten_centimetres_of_line_and_the_arc_of_the_design(kind):
     assert boundary_margin(points[:, 0], points[:, 1]).min() > 0.0
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", names("scenario"))
 def test_every_varied_draw_is_reachable_all_the_way(name):
-    lanes, scenario = 500, SCENARIOS[name]
+    lanes, scenario = 500, find_scenario(name)
     trajectory = prepared(scenario.varied()[0], lanes, seed=1000)
     points = np.stack([trajectory.sample(np.full(lanes, t))[:2] for t in np.linspace(0, scenario.duration, 400)])
     assert boundary_margin(points[:, 0], points[:, 1]).min() > 0.0
@@ -167,7 +168,7 @@ def made(name, seed):
     return env
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", names("scenario"))
 def test_an_odd_rig_that_is_taken_reaches_every_later_episode(scenario):
     found = [made(environment_id(scenario), seed) for seed in (*LATE, *range(24))]
     words = [one for one in found if isinstance(one, str)]

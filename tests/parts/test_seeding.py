@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, lane_seeds, stream
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_column
 from birthsim_env.physics.rig.parameters import value_of
 from birthsim_env.physics.rig.rows import RIG_ROWS, parameters_read
+from birthsim_env.registry import names
 
 RIG = Parameters()
 DRAWN = documented_ranges(RIG)
@@ -67,7 +68,7 @@ def test_other_random_parts_do_not_move_reference_stiffness_and_force(scenario, 
     np.testing.assert_array_equal(changed[3], world(randomize=True)[3])
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", names("scenario"))
 def test_without_randomization_every_seed_gives_the_same_fixed_experiment(name):
     one, other = (world(environment_id(name), seed=seed, lanes=6) for seed in (0, 100))
     for a, b in zip(one, other, strict=True):

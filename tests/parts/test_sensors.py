@@ -4,7 +4,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from birthsim_env.parts.sensors.sensors import IdealSensors, LabSensors
+from birthsim_env.parts.sensors.ideal import IdealSensors
+from birthsim_env.parts.sensors.lab import LabSensors
 from tests.parts.test_honest_sensors import board, still, swing, watch
 
 CIRCLE = "BirthSIM/Circle-v1"

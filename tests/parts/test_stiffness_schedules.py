@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from birthsim_env import StiffnessSchedule
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.registry import names
 from tests.parts.test_moving_hands import minimum_jerk
 
 CIRCLE = "BirthSIM/Circle-v1"
@@ -70,14 +71,14 @@ def test_three_PHASES_each_go_on_from_the_one_before():
     np.testing.assert_allclose(rows[0], (1e3, 2e3, 2e3, 3e3, 3e3, 3e3))
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", names("scenario"))
 def test_varied_schedules_draw_inside_the_feasible_range(name):
     # Feasible at mid stroke are 2400-5500 N/m on cylinder 1 and 1200-2800 N/m on cylinder 2.
-    schedule, lanes = SCENARIOS[name].varied()[2], 300
+    schedule, lanes = find_scenario(name).varied()[2], 300
     schedule.prepare(lanes)
     for lane in range(lanes):
         schedule.begin(lane, stream(lane, 0, "stiffness"))
-    rows = np.stack([schedule.sample(np.full(lanes, t)) for t in np.linspace(0, SCENARIOS[name].duration, 200)])
+    rows = np.stack([schedule.sample(np.full(lanes, t)) for t in np.linspace(0, find_scenario(name).duration, 200)])
     for row, low, high in ((0, 1000, 5000), (1, 1000, 5000), (2, 2400, 5500), (3, 1200, 2800)):
         assert low <= rows[:, row].min() <= rows[:, row].max() <= high
     assert np.ptp(rows[-1, 2]) > 0
@@ -91,9 +92,9 @@ def test_scenarios_ask_for_what_the_paper_and_the_design_say():
         "dystocia": ((2000, 4000), (4200, 4200), (2000, 2000)),
     }
     for name, (closed, first, second) in expected.items():
-        rows = course(SCENARIOS[name].nominal()[2], [0.0, SCENARIOS[name].duration])
+        rows = course(find_scenario(name).nominal()[2], [0.0, find_scenario(name).duration])
         np.testing.assert_allclose(rows[:4], [closed, closed, first, second])
-    rows = course(SCENARIOS["circle"].nominal()[2], [7.999, 8.0])
+    rows = course(find_scenario("circle").nominal()[2], [7.999, 8.0])
     np.testing.assert_array_equal(rows[0], (2000, 4000))
 
 

@@ -13,10 +13,10 @@ from birthsim_env.parts import courses
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.drawn.streams import TOGETHER, Streams, begin, worlds
-from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import parameter_column
+from birthsim_env.registry import names
 from birthsim_env.simulation import Simulation
 
 SEEDS = st.one_of(st.sampled_from([0, 1, 2**32 - 1, 2**32, 2**64 - 1]), st.integers(0, 2**64 - 1))
@@ -108,8 +108,12 @@ def begin_one_by_one(simulation: Simulation, lanes, seeds, episodes):
 
 
 CASES = [
-    *({"scenario": name, "randomize": varied, "sensors": "lab"} for name in SCENARIOS for varied in (False, True, "scenario")),
-    *({"scenario": "circle", "user_force": hand, "randomize": varied} for hand in HANDS for varied in (False, True)),
+    *(
+        {"scenario": name, "randomize": varied, "sensors": "lab"}
+        for name in names("scenario")
+        for varied in (False, True, "scenario")
+    ),
+    *({"scenario": "circle", "user_force": hand, "randomize": varied} for hand in names("hand") for varied in (False, True)),
     *({"scenario": "probe", "randomize": ranges} for ranges in RANGES.values()),
     {"scenario": "circle", "user_force": ForceProfile([(0, 0, 0), (1.0, 3.0, 4.0), (1.0, 0, 0)]), "randomize": True},
     {"scenario": "circle", "stiffness": StiffnessSchedule((0.0, 1.0), (2000.0, 3000.0), ((4000.0, 4600.0),) * 2, (2300.0,) * 2,

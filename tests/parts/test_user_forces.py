@@ -7,9 +7,10 @@ import pytest
 from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import ForceProfile
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls
+from birthsim_env.parts.hands.steps import AlternatingSteps
+from birthsim_env.parts.hands.user_forces import Pulls
 from birthsim_env.parts.hands.vacuum import VacuumPulls
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import find_scenario
 
 
 def course(force, seconds, seed=0, step=0.001):
@@ -33,7 +34,7 @@ def plateaus(times, size):
 
 def test_the_circle_is_pushed_by_30_newtons_in_two_identical_halves():
     """One axis at a time: a ramp of 0.1 s up, the hold, a ramp of 0.1 s down."""
-    times, rows = course(SCENARIOS["circle"].nominal()[1], 16.0)
+    times, rows = course(find_scenario("circle").nominal()[1], 16.0)
     expected = np.zeros_like(rows)
     for start, end, push in ((1, 2, (30, 0)), (3, 4, (-30, 0)), (5, 6, (0, 30)), (6.9, 7.7, (0, -30))):
         expected += np.outer(np.interp(times % 8.0, (start, start + 0.1, end, end + 0.1), (0, 1, 1, 0)), push)
@@ -42,17 +43,17 @@ def test_the_circle_is_pushed_by_30_newtons_in_two_identical_halves():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_varied_pushes_of_the_circle_stay_within_10_and_40_newtons(seed):
-    times, rows = course(SCENARIOS["circle"].varied()[1], 16.0, seed)
+    times, rows = course(find_scenario("circle").varied()[1], 16.0, seed)
     peaks = np.abs([at(times, rows, half + t).sum() for half in (0, 8) for t in (1.5, 3.5, 5.5, 7.3)])
     assert 10 <= peaks.min() < peaks.max() <= 40
     assert len(set(peaks.round(9))) == 8
 
 
 def test_the_probe_rests_for_three_seconds_ramps_over_one_and_holds():
-    times, rows = course(SCENARIOS["probe"].nominal()[1], 7.0)
+    times, rows = course(find_scenario("probe").nominal()[1], 7.0)
     np.testing.assert_allclose(rows[:, 0], np.clip(times - 3.0, 0, 1) * 20.0, atol=1e-9)
     np.testing.assert_array_equal(rows[:, 1], 0.0)
-    ends = np.array([course(SCENARIOS["probe"].varied()[1], 7.0, seed, step=1.0)[1][-1] for seed in range(200)])
+    ends = np.array([course(find_scenario("probe").varied()[1], 7.0, seed, step=1.0)[1][-1] for seed in range(200)])
     sizes, turns = np.hypot(*ends.T), np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))
     assert 5 <= sizes.min() < 7
     assert 38 < sizes.max() <= 40
@@ -64,7 +65,7 @@ FORCEPS = [("nominal", 0, (175, 175), (70, 70)), *(("varied", seed, (150, 200), 
 
 @pytest.mark.parametrize(("kind", "seed", "sizes", "rates"), FORCEPS)
 def test_forceps_pulls_are_ramped_held_and_released(kind, seed, sizes, rates):
-    times, rows = course(getattr(SCENARIOS["forceps"], kind)()[1], 15.0, seed)
+    times, rows = course(getattr(find_scenario("forceps"), kind)()[1], 15.0, seed)
     size = np.hypot(*rows.T)
     held = plateaus(times, size)
     assert len(held) == 2
@@ -89,7 +90,7 @@ def test_forceps_pulls_are_ramped_held_and_released(kind, seed, sizes, rates):
 
 def tops_of(scenario, kind="nominal", seed=0):
     """N. What is held of each pull; at the end nothing is left."""
-    times, rows = course(getattr(SCENARIOS[scenario], kind)()[1], SCENARIOS[scenario].duration, seed)
+    times, rows = course(getattr(find_scenario(scenario), kind)()[1], find_scenario(scenario).duration, seed)
     size = np.hypot(*rows.T)
     assert size[-1] == 0.0
     return [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]
@@ -125,7 +126,7 @@ def test_the_rig_can_hold_every_vacuum_pull(randomize):
 
 def contractions_of(kind, seed=0):
     """Size, N, share of the pushes and their number, of both: sin^2, and over its middle half the pushes, each a sin^2."""
-    rows, u = course(getattr(SCENARIOS["descent"], kind)()[1], 24.0, seed, step=0.01)[1], np.arange(1200) / 1200
+    rows, u = course(getattr(find_scenario("descent"), kind)()[1], 24.0, seed, step=0.01)[1], np.arange(1200) / 1200
     np.testing.assert_array_equal(rows[:, 1], 0.0)
     assert rows[-1, 0] == 0.0
     for pull in rows[:2400, 0].reshape(2, 1200):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from agents.residual.settings import LAWS, NO_LAW, ResidualSettings, needs_force
-from birthsim_env.parts.sensors.honest_sensors import HonestSensors
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.sensors.honest import HonestSensors
+from tests.registered import registered
 
 CIRCLE, LANES, STEPS = "BirthSIM/CircleResidual-v1", 3, 140
 BLIND = [law for law in LAWS if not needs_force(law)]
@@ -29,24 +29,18 @@ def actions_for(law, reach=0.3):
     return np.random.default_rng(0).uniform(-reach, reach, (STEPS, LANES, size)).astype(np.float32)
 
 
-class Lying:
+class Lying(HonestSensors):
     """Honest sensors whose force sensor shows something else altogether."""
 
-    sampled, drawn = True, HonestSensors.drawn
-
-    def __init__(self, *setting):
-        self._honest = HonestSensors(*setting)
-        self.begin, self.vary, self.put_out = self._honest.begin, self._honest.vary, self._honest.put_out
-
     def measure(self, *seen):
-        told = self._honest.measure(*seen)
+        told = super().measure(*seen)
         told.user_force[:] = 1000.0
         return told
 
 
 @pytest.mark.parametrize("law", BLIND)
 def test_what_a_force_sensor_would_show_changes_no_bit(law, monkeypatch):
-    monkeypatch.setitem(SENSORS, "lying", Lying)
+    registered(monkeypatch, Lying, sensors="lying")
     blind = [course(law, actions_for(law), sensors=kind, force_sensor=False) for kind in ("honest", "lying")]
     for one, other in zip(*blind, strict=True):
         np.testing.assert_array_equal(one, other)

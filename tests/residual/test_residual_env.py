@@ -11,11 +11,11 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.registry import names
 from tests.oracles.residual_parts import UnexplainedForceObserver
 
-IDS = tuple(environment_id(name, "Residual") for name in SCENARIOS)
+IDS = tuple(environment_id(name, "Residual") for name in names("scenario"))
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 RIG = Parameters()
 
@@ -61,7 +61,7 @@ def assert_follows(env, actions, rows, seed):
 
 
 @pytest.mark.parametrize("law", LAWS[:-1])
-@pytest.mark.parametrize("sensors", SENSORS)
+@pytest.mark.parametrize("sensors", names("sensors"))
 def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)

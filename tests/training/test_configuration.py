@@ -13,16 +13,16 @@ from agents.residual.settings import ResidualSettings
 from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration
 from agents.training.margin import widened
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.physics.rig.parameters import Parameters
 
 RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))
 
 
 def test_there_is_a_configuration_for_every_scenario_in_both_files():
-    for name in SCENARIOS:
+    for name in studied_scenarios():
         assert load_configuration(name)[0].environment == environment_id(name, "Residual")
-    assert set(RL_ZOO) == {environment_id(name, "Residual") for name in SCENARIOS}
+    assert set(RL_ZOO) == {environment_id(name, "Residual") for name in studied_scenarios()}
 
 
 @pytest.mark.parametrize("name", configuration_names())
@@ -66,7 +66,7 @@ def test_a_file_of_ones_own_says_only_what_differs(tmp_path):
     assert load_configuration("probe")[0].steps != 7
 
 
-@pytest.mark.parametrize("name", sorted(SCENARIOS))
+@pytest.mark.parametrize("name", sorted(studied_scenarios()))
 def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
     training, residual = load_configuration(name)
     zoo = RL_ZOO[training.environment]

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.parts.drawn.streams import Streams
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, least_dead_volume, parameter_of
 from birthsim_env.physics.rig.values import is_finite, shown
+from birthsim_env.registry import entries
 
 Ranges = Mapping[str, tuple[float, float]]
 
@@ -23,16 +24,18 @@ about its sensors is wrong: their parameters are drawn, and the scenario varies.
 _WHOLE = tuple(name for name, part in SECTIONS.items() if all(one.shared for one in part.parameters.values()))
 SHARED = (*_WHOLE, *(name for name, one in DECLARED.items() if one.shared and name.partition(".")[0] not in _WHOLE))
 """Sections and parameters in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal
-rig, and sensors too where their model does not draw them (``sensors.drawn_by``)."""
-
-
-_DRAWN_BY_SOME = tuple(name for sensors in SENSORS for name in drawn_by(sensors))
+rig, and sensors too where their model does not draw them (``SensorModel.drawn``)."""
 
 BORES = ("cylinder1.piston_diameter", "cylinder2.piston_diameter")
 """Wide ones ask for dead volume, narrow ones for thin rods."""
 
 KNOWN = 0.2
 """Share of a parameter by which it may be off where a rig's owner has described it; assumed."""
+
+
+def _drawn_by_some() -> set[str]:
+    """Names of the parameters that one sensor model or another draws."""
+    return {name for model in entries("sensors") for name in model.made.drawn}
 
 
 def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
@@ -52,7 +55,7 @@ def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, 
     volume = "chambers.dead_volume"
     ranges[volume] = (max(ranges[volume][0], least_dead_volume(nominal)), ranges[volume][1])
     ranges.update({name: (low, high) for name, low, high in nominal.ranges})
-    left_out = set(_DRAWN_BY_SOME) - set(drawn_by(sensors))
+    left_out = _drawn_by_some() - set(drawn_by(sensors))
     return {name: pair for name, pair in ranges.items() if name not in left_out}
 
 
@@ -91,7 +94,7 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
         if parameter_of(name).choices:
             raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
         if name not in drawn_by(sensors) and (name.partition(".")[0] in SHARED or name in SHARED):
-            more = f"; with other sensors {name}" if name in _DRAWN_BY_SOME else ""
+            more = f"; with other sensors {name}" if name in _drawn_by_some() else ""
             raise ValueError(
                 f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes{more}"
             )

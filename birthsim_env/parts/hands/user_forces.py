@@ -1,17 +1,18 @@
 """Forces of the user's hand at the end effector, evaluated for all lanes at once.
 
-A user's own force derives from ``UserForce`` and implements ``force``. The built-in ones are piecewise linear in time.
+A user's own force derives from ``UserForce`` and implements ``force``. ``ForceProfile`` is piecewise linear in time. A hand
+that is registered in its own file by ``@register(hand="name", about="...")`` is also known by its name.
 """
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import FORCE, MOTION, TIME, Seen, World
-from birthsim_env.loop.stage import Stage, table1, table3
+from birthsim_env.loop.stage import Stage, Staged, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.parts.times import Timed, timed
@@ -21,7 +22,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.arrays import shape_of
-from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
+from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 from birthsim_env.restored import Declared, Kept
 
 STRONGEST = 1000.0
@@ -31,7 +32,7 @@ MOST = 100
 """Pushes, pulls or contractions of an episode."""
 
 
-class UserForce:
+class UserForce(Staged):
     """The hand (or the uterus) that pushes the end effector; derive from it to make one of your own.
 
     Notes
@@ -65,9 +66,19 @@ class UserForce:
     [[10.0, 0.0], [20.0, 0.0]]
     """
 
-    closed_loop = False
-    jump_rate = 150.0
+    closed_loop: bool = False
+    """Whether it feels the rig: whether ``force`` depends on position or velocity."""
+
+    jump_rate: float = 150.0
+    """N/s of a component, beyond which a change counts as a jump."""
+
     timed: Timed | None = None
+    """When it does something, where that is known."""
+
+    @classmethod
+    def varied(cls) -> Self:
+        """What the name of a registered hand stands for where ``randomize`` draws the experiment: its numbers are ranges."""
+        return cls()
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
@@ -85,15 +96,15 @@ class CompiledForce(UserForce):
     """A force that a ``stage`` of the closed loop computes."""
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        forces, stage = np.zeros((time.shape[0], 2, time.shape[1])), self.stage()
+        forces, stages = np.zeros((time.shape[0], 2, time.shape[1])), [self.stage()]
         motion = [(np.concatenate([position, velocity]), MOTION)] if self.closed_loop else []
         for now, force in zip(np.array(time, dtype=np.float64), forces, strict=True):
-            Loop(len(now), [(force, FORCE), *motion], [(now[None], TIME)], [stage]).run()
+            Loop(len(now), [(force, FORCE), *motion], [(now[None], TIME)], stages).run()
         return forces
 
     def stage(self) -> Stage:
         """``force``, compiled into the closed loop."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__}.stage() is missing; it returns a birthsim_env.loop.stage.Stage")
 
 
 def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) -> Array:
@@ -202,6 +213,7 @@ class ForceProfile(CompiledForce):
     """
 
     in_state: ClassVar[Declared] = {"_knots": Kept(grows=True, shortest=1), "_counts": Kept(1, "_knots", whole=True)}
+    _knots: Array = np.zeros((1, 3, 0))
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
         if not (knots is None or isinstance(knots, (list, tuple))):
@@ -216,7 +228,7 @@ class ForceProfile(CompiledForce):
         return self._fixed
 
     def prepare(self, num_envs: int) -> None:
-        self._knots: Array = np.zeros((1, 3, num_envs))
+        self._knots = np.zeros((1, 3, num_envs))
         self._counts = np.ones(num_envs)
 
     @vectorised
@@ -233,40 +245,10 @@ class ForceProfile(CompiledForce):
 
     def first_knot(self, lanes: NDArray[np.intp]) -> float:
         """When the first knot of any of ``lanes`` (L,) is, s; 0 for a class that prepares no knots."""
-        return float(self._knots[0, 0].take(lanes).min()) if hasattr(self, "_knots") else 0.0
+        return float(self._knots[0, 0].take(lanes).min()) if self._knots.size else 0.0
 
     def stage(self) -> Stage:
         return Stage(_interpolate, tables=(self._knots, self._counts))
-
-
-class AlternatingSteps(ForceProfile):
-    """The pushes of Fig. 4, repeated every ``repeat`` s: +x, -x, +y, -y of ``amplitude`` N, ``ramp`` s up and down."""
-
-    STARTS = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0), (6.9, 7.7))
-    """Assumed: start and end of the four pushes, s; every push ends well before the next."""
-
-    jump_rate = 1.0
-    """N/s: every ramp is a step, however small the push."""
-
-    def __init__(self, amplitude: Range = 30.0, ramp: float = 0.1, repeat: float = 8.0, repeats: int = 2) -> None:
-        super().__init__()
-        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
-        checked_number("ramp", ramp, "s", least=0.0, most=0.3)
-        checked_number("repeat", repeat, "s", least=8.0, most=LONGEST)
-        repeats = checked_count("repeats", repeats, 0, MOST)
-        self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
-
-    @vectorised
-    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-        knots = [(0.0, 0.0, 0.0)]
-        directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
-        for k in range(self.repeats):
-            for (start, end), (dx, dy) in zip(self.STARTS, directions, strict=True):
-                size = draw(self.amplitude, rng)
-                begin, stop = k * self.repeat + start, k * self.repeat + end
-                knots += [(begin, 0.0, 0.0), (begin + self.ramp, size * dx, size * dy)]
-                knots += [(stop, size * dx, size * dy), (stop + self.ramp, 0.0, 0.0)]
-        return knots
 
 
 class Ramp(ForceProfile):

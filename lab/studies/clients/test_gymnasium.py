@@ -11,9 +11,10 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from moviepy import VideoFileClip
 
 import birthsim_env
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.registry import names
 
-IDS = [environment_id(scenario) for scenario in SCENARIOS]
+IDS = [environment_id(scenario) for scenario in names("scenario")]
 STEPS = 40
 
 

@@ -23,15 +23,15 @@ from baselines.bench.statistics import penalize_lost
 from baselines.registry import controlling_names, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.assembly import Arguments
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, studied_scenarios
+from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
-from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
 from lab.studies.comparison.paired import paired_ratios, summary_with_interval
 from lab.studies.comparison.privileged import TOLD, can_be_privileged, evaluate_privileged
 
-ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
+ENVIRONMENTS = tuple(environment_id(scenario) for scenario in studied_scenarios())
 COMPARED = ("ideal", "lab")
 """Sensor models of the bench's tables where none is named."""
 PLANTS: dict[str, bool | str] = {
@@ -53,7 +53,7 @@ RIGS = {
 """Plant -> its words in tables and pictures."""
 
 MOVING = ("sine", "noise", "guided")
-"""Hands of ``birthsim_env.parts.hands.moving_hands`` that move all the time."""
+"""Hands that move all the time."""
 
 LEARNED = "residual:"
 """Before the name of a policy, of which all training seeds are measured together."""

@@ -8,7 +8,6 @@ from typing import Any
 
 from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import names
 from lab.studies.comparison.grid import (
@@ -207,7 +206,7 @@ def comparison(
         show or partial(tables, name=name),
         draw,
         partial=True,
-        allowed={"env": ENVIRONMENTS, "sensors": tuple(SENSORS), "plant": tuple(PLANTS)},
+        allowed={"env": ENVIRONMENTS, "sensors": tuple(names("sensors")), "plant": tuple(PLANTS)},
         words={
             "controller": "registered names, with options, path/to/file.py:Class, residual:POLICY, told:NAME",
             "plant": "what differs from episode to episode beside the scenario",

@@ -118,7 +118,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
     from birthsim_env.parts import references, stiffness_schedules
-    from birthsim_env.parts.hands import contractions, moving_hands, user_forces
+    from birthsim_env.parts.hands import contractions, guided, noise, sine, steps, user_forces
     from birthsim_env.physics.plant import Plant
     from birthsim_env.registry import entries
 
@@ -126,12 +126,12 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
         *(references.Circle, references.Path, references.FixedTarget, stiffness_schedules.StiffnessSchedule),
         *(
             user_forces.ForceProfile,
-            user_forces.AlternatingSteps,
+            steps.AlternatingSteps,
             user_forces.Ramp,
             user_forces.Pulls,
             contractions.Contractions,
         ),
-        *(moving_hands.Sine, moving_hands.Noise, moving_hands.Guided),
+        *(sine.Sine, noise.Noise, guided.Guided),
     )
     laws = [one.made for one in entries("controller") if inspect.isclass(one.made)]
     return {

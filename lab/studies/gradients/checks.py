@@ -8,7 +8,8 @@ import agents  # noqa: F401  registers the residual environments
 from baselines.bench.statistics import quantile
 from baselines.registry import LIMITED
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id, studied_scenarios
+from birthsim_env.registry import names
 from lab.studies.comparison.grid import default_controllers
 from lab.studies.gradients.loops import begun, compared
 from lab.studies.results import Content
@@ -16,7 +17,7 @@ from lab.studies.study import Found, Options, Study
 from lab.studies.tables import markdown
 
 CIRCLE = "BirthSIM/Circle-v1"
-SCENARIOS = (CIRCLE, *(f"BirthSIM/{name}" for name in ("Probe-v2", "Descent-v1", "Forceps-v1", "Dystocia-v1", "Vacuum-v0")))
+ENVIRONMENTS = tuple(environment_id(name) for name in studied_scenarios())
 
 CONTROLLERS = (*default_controllers(), f"{LIMITED}pid", f"{LIMITED}admittance-adaptive")
 
@@ -34,10 +35,10 @@ def agreement(lanes: int, steps: int, begins: int, **arguments: Any) -> Result:
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
-    loops = {name: {"world": name, "lanes": options.states, "steps": 1, "begins": 300} for name in SCENARIOS}
+    loops = {name: {"world": name, "lanes": options.states, "steps": 1, "begins": 300} for name in ENVIRONMENTS}
     loops["a hand that feels"] = {**loops[CIRCLE], "user_force": "guided"}
     for name in CONTROLLERS:
-        for sensors in SENSORS:
+        for sensors in names("sensors"):
             loop = {"world": CIRCLE, "controller": name, "sensors": sensors, "lanes": options.lanes, "steps": 4, "begins": 20}
             loops[f"{name}, {sensors}"] = loop
     return {name: Task(f"agreement{k}", agreement, loop) for k, (name, loop) in enumerate(loops.items())}

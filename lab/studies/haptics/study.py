@@ -7,8 +7,8 @@ from typing import Any
 
 from baselines.bench.pieces import controller_settings
 from baselines.work.tasks import Task
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import names
 from lab.studies.haptics.kept import kept
 from lab.studies.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
 from lab.studies.haptics.tables import report
@@ -73,7 +73,7 @@ def _haptics(name: str, draw: Callable[[Content, Path], list[Path]], **options: 
         UNITS,
         partial(_shown, name=name),
         draw,
-        allowed={"sensors": tuple(SENSORS), "subject": SUBJECTS},
+        allowed={"sensors": tuple(names("sensors")), "subject": SUBJECTS},
         words={
             "controller": "registered names, with options, or path/to/file.py:Class",
             "rigs": "randomised ones",

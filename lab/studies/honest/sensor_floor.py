@@ -18,7 +18,7 @@ from birthsim_env.loop.signals import displacement
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import forces_of
-from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.honest import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters

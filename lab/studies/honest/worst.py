@@ -14,11 +14,13 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
-from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.scenarios import environment_id, find_scenario
+from birthsim_env.parts.scenarios.probe import REST
+from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, load_parameters, value_of
 from birthsim_env.physics.rig.values import checked_number
+from birthsim_env.registry import names
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
 from lab.studies.results import Content
@@ -26,7 +28,7 @@ from lab.studies.study import Options, Study
 from lab.studies.tables import markdown
 
 ENVIRONMENT = environment_id("probe")
-PUSHED = SCENARIOS["probe"].duration - PROBE_REST
+PUSHED = find_scenario("probe").duration - REST
 """s of ``ENVIRONMENT`` from the beginning of its push to its end."""
 LONGEST_REST = 60.0
 """s; assumed: no rig needs longer to come to rest."""
@@ -146,7 +148,7 @@ def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], 
     env.reset(seed=[seed])
     shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "figures", {}).items()}
     simulation = env.simulation
-    simulation.run(round((PROBE_REST + PUSHED / 2) / simulation.period))
+    simulation.run(round((REST + PUSHED / 2) / simulation.period))
     force, target = simulation.force, simulation.reference.position
     way = simulation.reference.compliant_target(force) - target
     env.close()
@@ -166,7 +168,7 @@ def _evaluated(
     name: str, rest: float, rig: Parameters, sensors: str, seeds: Sequence[int] | Seeds, rigs: Array | None = None
 ) -> Evaluation:
     """In the worlds of ``seeds``, whose ``rigs`` (PARAMETERS, N) are drawn where none are given."""
-    hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
+    hand = {} if rest == REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
     setting["randomize"] = True if rigs is None else "sensors" if drawn_by(sensors) else "scenario"
     law, own = make_controller(name, rig), [int(seed) for seed in seeds]
@@ -177,11 +179,11 @@ STUDY = Study(
     (__name__,),
     {
         "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"),
-        "sensors": tuple(SENSORS),
+        "sensors": tuple(names("sensors")),
         "drawn": False,
         "metric": "stiffness_error",
         "limit": 15.0,
-        "rest": PROBE_REST,
+        "rest": REST,
         "episodes": 800,
         "seed": 90000,
         "parameters": "",
@@ -190,7 +192,7 @@ STUDY = Study(
     lambda _, found: list(found.values()),
     {**UNITS, "push_n": "N", "way_mm": "mm"},
     _shown,
-    allowed={"sensors": tuple(SENSORS), "metric": tuple(UNITS)},
+    allowed={"sensors": tuple(names("sensors")), "metric": tuple(UNITS)},
     words={
         "controller": "registered names",
         "drawn": "randomise the figures of honest sensors too",

@@ -9,7 +9,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.statistics import number
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.least_air.schedule import least_air
 from lab.studies.results import Content
@@ -29,8 +29,8 @@ def measure(scenario: str, controller: str, sensors: str, episodes: int, seed: i
     """With the scenario's own pneumatic stiffness and with least air, on the same randomised rigs: the median of ``air``; the
     median of what is ``saved``, and 5 and 95 % of the episodes; median and 95 % of the settled ``error``; ``lost`` episodes."""
     rig = Parameters()
-    reference, _, own = SCENARIOS[scenario].nominal()
-    least = least_air(reference, own, SCENARIOS[scenario].duration, rig, PUSHES[scenario])
+    reference, _, own = find_scenario(scenario).nominal()
+    least = least_air(reference, own, find_scenario(scenario).duration, rig, PUSHES[scenario])
     both = [
         evaluate(
             environment_id(scenario),

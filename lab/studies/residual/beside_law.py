@@ -20,9 +20,9 @@ from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, n
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.files import finite
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import names
 from lab.studies.haptics.rendering import rendering
 from lab.studies.haptics.worlds import Condition
 from lab.studies.results import Content
@@ -258,7 +258,7 @@ STUDY = Study(
     _kept,
     {"error": "mm", "stiffness": "%", "bandwidth": "Hz", "jnd": ""},
     _shown,
-    allowed={"sensors": tuple(SENSORS)},
+    allowed={"sensors": tuple(names("sensors"))},
     words={
         "policy": "a folder of birthsim train or distill, or a shipped policy",
         "parameters": "TOML file of the rig",

@@ -10,7 +10,7 @@ from baselines.bench.statistics import penalize_lost
 from baselines.work.tasks import Result
 from birthsim_env.assembly import Arguments
 from birthsim_env.loop.signals import Reference
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.haptics.recording import record
@@ -56,7 +56,8 @@ def _episodes(condition: Condition) -> dict[str, Any]:
     worlds: Arguments = {"sensors": condition.sensors, "randomize": True, "parameters": condition.rig}
     who, count, seed = condition.controller, condition.rigs, condition.seed
     episodes = {
-        name: evaluate(environment_id(name), condition.law(), who, count, seed, progress=False, **worlds) for name in SCENARIOS
+        name: evaluate(environment_id(name), condition.law(), who, count, seed, progress=False, **worlds)
+        for name in studied_scenarios()
     }
     probe = episodes["probe"].metrics
     return {

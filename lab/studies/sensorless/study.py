@@ -9,7 +9,7 @@ import numpy as np
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable, quantile
 from baselines.work.tasks import Task
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import studied_scenarios
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from lab.studies.sensorless.measures import measure
@@ -58,8 +58,10 @@ def kept(plants: Iterable[str], found: Found) -> Any:
     rows = []
     for rig, plant in product(RIGS, plants):
         pieces = [result for key, result in found.items() if key[:2] == (rig, plant)]
-        values = {name: np.concatenate([piece[name] for piece in pieces]) for name in (*COLUMNS, *SCENARIOS, "lost")}
-        figures = {name: [quantile(values[name], share) for share in (0.5, 0.95, 1.0)] for name in (*COLUMNS, *SCENARIOS)}
+        values = {name: np.concatenate([piece[name] for piece in pieces]) for name in (*COLUMNS, *studied_scenarios(), "lost")}
+        figures = {
+            name: [quantile(values[name], share) for share in (0.5, 0.95, 1.0)] for name in (*COLUMNS, *studied_scenarios())
+        }
         lost = int(values["lost"].sum())
         rows.append({"rig": rig, "plant": plant, "lost": lost, "of": len(values["lost"]), "figures": figures})
     return jsonable(rows)
@@ -68,7 +70,10 @@ def kept(plants: Iterable[str], found: Found) -> Any:
 def tables(figures: Any, settings: dict[str, Any]) -> str:
     """What a hand feels, and errors by scenario, in the worlds of a result's ``settings``."""
     found = [f"{worlds(settings['seed'], settings['episodes'])}, of every scenario."]
-    for names, titles in ((COLUMNS, list(COLUMNS.values())), (SCENARIOS, [f"{name}: settled error, mm" for name in SCENARIOS])):
+    for names, titles in (
+        (COLUMNS, list(COLUMNS.values())),
+        (studied_scenarios(), [f"{name}: settled error, mm" for name in studied_scenarios()]),
+    ):
         rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
         for row in figures:
             shown = [cells(row["figures"][name][:2]) for name in names]
@@ -88,7 +93,7 @@ STUDY = Study(
         "clamped_mm": "mm",
         "clamped_N": "N",
         "overshoot": "mm",
-        **dict.fromkeys(SCENARIOS, "mm"),
+        **dict.fromkeys(studied_scenarios(), "mm"),
         "air": "l/min",
         "clamped_air": "l/min",
         "turns": "1/s",

@@ -15,11 +15,10 @@ import agents
 from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import names
 
 assert agents  # registers the environments with a law inside
 
@@ -74,11 +73,11 @@ def world_of(number: int, seed: int) -> World:
     def one(options: Any) -> Any:
         return options[int(rng.integers(len(options)))]
 
-    scenario = list(SCENARIOS)[number % len(SCENARIOS)]
-    friction, sensors, randomize = one(FRICTION), one(list(SENSORS)), one(VARIED)
+    scenario = names("scenario")[number % len(names("scenario"))]
+    friction, sensors, randomize = one(FRICTION), one(names("sensors")), one(VARIED)
     ranges = documented_ranges(Parameters())
     corner = {name: float(one(bounds)) for name, bounds in ranges.items()} if randomize is not True else {}
-    hand = one([None, None, None, *HANDS])
+    hand = one([None, None, None, *names("hand")])
     kind = rng.random()
     if kind < 0.6:
         arguments = {"action_mode": one(("valve", "flow")), "valves": one(("two_valves", "one_valve"))}

@@ -5,8 +5,8 @@ from typing import Any
 
 from baselines.bench.pieces import controller_settings
 from baselines.work.tasks import Task
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import names
 from lab.studies.results import Content
 from lab.studies.stability import maps as stability
 from lab.studies.stability.maps import MAPS, describe_map, stability_tasks
@@ -85,7 +85,7 @@ STUDY = Study(
     {"motion_mm": "mm"},
     _shown,
     _pictures,
-    allowed={"sensors": tuple(SENSORS), "map": tuple(MAPS)},
+    allowed={"sensors": tuple(names("sensors")), "map": tuple(MAPS)},
     words={
         "controller": "a registered name, with options, or path/to/file.py:Class",
         "seed": "of the sensors' noise",

@@ -8,8 +8,8 @@ from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.values import in_line, shown
+from birthsim_env.registry import names
 
 NAMES = ("environment", "controller", "policy", "sensors", "randomize", "reference", "user_force", "train")
 """What may vary as a whole."""
@@ -26,7 +26,7 @@ GROUPS = {
 FIXED = {"episodes": 32, "seed": 0, "parameters": None}
 """What only [base] may have, and its default: episodes a point, the seed of the first, and a TOML file of the believed rig."""
 
-_CHOICES: dict[str, tuple[Any, ...]] = {"sensors": tuple(SENSORS), "randomize": RANDOMIZE}
+_CHOICES: dict[str, tuple[Any, ...]] = {"sensors": tuple(names("sensors")), "randomize": RANDOMIZE}
 _SETTINGS = {"training": TrainingSettings, "residual": ResidualSettings}
 
 

@@ -15,9 +15,9 @@ from birthsim_build.bundle import Bundle, identifier, make_bundle
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.targets import HOST
 from birthsim_build.estimate import CYCLES
+from birthsim_env import registry
 from birthsim_env.files import write_json
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import studied_scenarios
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.results import Content
@@ -79,7 +79,7 @@ def _cases(target: str, bundle: Bundle) -> list[Case]:
     if target == "every":
         names = dict.fromkeys(controller for controller, _ in bundle.laws)
         loops = [("circle", sensors, controller) for sensors in ("ideal", "lab") for controller in names]
-        loops += [(scenario, sensors, LAWS[1]) for scenario in SCENARIOS for sensors in SENSORS]
+        loops += [(scenario, sensors, LAWS[1]) for scenario in studied_scenarios() for sensors in registry.names("sensors")]
         return [_loop(*loop) for loop in dict.fromkeys(loops)]
     if target == "cortex-m7":
         return [_law(controller, sensors) for controller in LAWS for sensors in ("ideal", "lab")]
@@ -96,7 +96,7 @@ def built(target: str) -> Result:
         return _threads(rig)
     require_linker()
     if target == "every":
-        bundle = make_bundle(rig, SCENARIOS, SENSORS, compiled_names(listed=True), [POLICY])
+        bundle = make_bundle(rig, studied_scenarios(), registry.names("sensors"), compiled_names(listed=True), [POLICY])
     elif target == "cortex-m7":
         bundle = make_bundle(rig, (), ["ideal", "lab"], LAWS, alone=True)
     else:

@@ -1,20 +1,17 @@
-"""A scenario of a user's own and its id: a stroll of 40 mm along x under a push."""
-
-import gymnasium
+"""A scenario of a user's own: a stroll of 40 mm along x under a push."""
 
 from birthsim_env import Path, StiffnessSchedule
 from birthsim_env.parts.hands.user_forces import Ramp
-from birthsim_env.parts.scenarios import SCENARIOS, Scenario
+from birthsim_env.parts.scenarios import Scenario
+from birthsim_env.registry import register
 
 
-def parts():
-    return Path((0.48, 0.0), 0.0, 0.04, ends=2.0), Ramp(amplitude=15.0), StiffnessSchedule()
+@register(scenario="stroll", about="The head strolls 40 mm along x under a push.")
+class Stroll(Scenario):
+    """a stroll of 40 mm along x under a push of 15 N"""
 
+    title = "A stroll of 40 mm"
+    duration = 3.0
 
-SCENARIOS["stroll"] = Scenario("A stroll of 40 mm", 3.0, parts, parts)
-gymnasium.register(
-    "Mine/Stroll-v0",
-    "birthsim_env.env:BirthSIMEnv",
-    vector_entry_point="birthsim_env.vector_env:BirthSIMVectorEnv",
-    kwargs={"scenario": "stroll"},
-)
+    def nominal(self):
+        return Path((0.48, 0.0), 0.0, 0.04, ends=2.0), Ramp(amplitude=15.0), StiffnessSchedule()

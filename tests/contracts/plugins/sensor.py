@@ -4,9 +4,10 @@ import numpy as np
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage
-from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors, ideal_stage
+from birthsim_env.parts.sensors.ideal import IdealSensors, ideal_stage
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.records import Numbers, number
+from birthsim_env.registry import register
 
 
 class Step(Numbers):
@@ -22,9 +23,7 @@ def coarse(world: World, seen: Seen, memory: int, constants: Step, tables: int, 
     return 0
 
 
+@register(sensors="coarse", about="Positions in whole millimetres.")
 class CoarseSensors(IdealSensors):
     def stage(self):
         return Stage(coarse, Step.numbers(step=1e-3))
-
-
-SENSORS["coarse"] = CoarseSensors

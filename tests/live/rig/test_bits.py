@@ -8,8 +8,8 @@ import pytest
 from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
 from birthsim_env import Parameters, StiffnessSchedule, UserForce
 from birthsim_env.loop.rows import SINCE_JUMP
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.registry import names
 from birthsim_live.rig.folder import packed_page, write_page
 from birthsim_live.rig.words import LEARNING
 from lab.studies.targets.reference import SHARED, loop_rows
@@ -40,7 +40,12 @@ class Hand(UserForce):
     closed_loop = True
 
     def __init__(self, scenario, pushes, position=None, force=(0.0, 0.0)):
-        self.own, self._pushes, self._place, self._push = SCENARIOS[scenario].nominal()[1], pushes, position, np.array(force)
+        self.own, self._pushes, self._place, self._push = (
+            find_scenario(scenario).nominal()[1],
+            pushes,
+            position,
+            np.array(force),
+        )
         self.jump_rate = self.own.jump_rate
 
     def prepare(self, num_envs):
@@ -98,7 +103,14 @@ def test_a_law_a_policy_hands_and_another_rig(page):
 
 @pytest.mark.slow
 def test_every_scenario_with_every_sensor(page):
-    check(page, *(({"scenario": one, "sensors": kind, "scenario_force": True}, None) for one in SCENARIOS for kind in SENSORS))
+    check(
+        page,
+        *(
+            ({"scenario": one, "sensors": kind, "scenario_force": True}, None)
+            for one in names("scenario")
+            for kind in names("sensors")
+        ),
+    )
 
 
 @pytest.mark.slow

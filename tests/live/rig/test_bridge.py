@@ -7,8 +7,9 @@ import pytest
 
 from birthsim_build.stages import LEAST_TIME, PACE
 from birthsim_env import Circle, FixedTarget, Parameters
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import find_scenario
 from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.registry import names
 from tests.live.rig.course import Course
 
 
@@ -30,10 +31,10 @@ def test_a_bridge_meets_both_ends_and_its_derivatives_are_true():
         assert np.abs((here[2:] - here[:-2]) / (2 * step) - rate[1:-1]).max() < 1e-5 * np.abs(rate).max()
 
 
-@pytest.mark.parametrize(("first", "second"), list(permutations(SCENARIOS, 2)))
+@pytest.mark.parametrize(("first", "second"), list(permutations(names("scenario"), 2)))
 def test_bridges_between_scenarios_stay_in_the_workspace(first, second):
     for now in (0.7, 2.9):
-        course = Course(SCENARIOS[first].nominal()[0])
-        course.follow(SCENARIOS[second].nominal()[0], now)
+        course = Course(find_scenario(first).nominal()[0])
+        course.follow(find_scenario(second).nominal()[0], now)
         samples = np.stack([course.sample(t)[:2] for t in np.arange(now, now + 4, 0.02)], axis=1)
         inverse_geometry(samples, Parameters())

@@ -17,7 +17,7 @@ from agents.policy.files import load_policy
 from agents.policy.seeds import best_policy
 from baselines.registry import controlling_names, make_controller
 from birthsim_env import Parameters
-from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.registry import names
 
 FILE = Path(__file__).parent / "fingerprints.json"
@@ -29,7 +29,7 @@ PERIODS, STEPS = 800, 80
 def rows() -> dict[str, tuple[str, str, str]]:
     """Name -> (scenario, sensors, who drives: "openings", "residual" or a controller)."""
     chosen = [("circle", "lab", name) for name in controlling_names()]
-    for scenario in SCENARIOS:
+    for scenario in studied_scenarios():
         driven = ("openings", "backstepping", *(["residual"] if scenario in names("policy") else []))
         chosen += [(scenario, "ideal", who) for who in driven]
         chosen += [(scenario, "lab", "admittance-backstepping")]

@@ -1,23 +1,24 @@
-"""Sensors with the errors that data sheets and laboratories know: the sensor model ``honest``.
+"""What a control board reads of a force sensor, a tracker, pressure cells and an accelerometer, each with its errors.
 
-Figures, their basis and the ranges that are drawn from are fields of ``physics.electronics``.
+The sensor models ``lab`` and ``honest`` are such boards. Figures, their basis and the ranges that are drawn from are fields of
+``physics.electronics``.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import FORCE, MOTION, OPENING, STATE, TICK, Seen, Signals, World, measurement_of
+from birthsim_env.loop.rows import FORCE, MOTION, STATE, TICK, Seen, Signals, World, measurement_of
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
-from birthsim_env.parts.sensors.noise import happens, noise_of, uniform
-from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Figures, Shared, Unit, field, shared, shift, work_out
+from birthsim_env.parts.sensors.model import SensorModel
+from birthsim_env.parts.sensors.noise import happens, noise_of
+from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Figures, Shared, Unit, field, shared, work_out
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel, over
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
@@ -25,7 +26,7 @@ from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.restored import Declared, Kept
 
-TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
+TRACKED, NOISE_OF_FORCE, LOST, MISSED = 4, 6, 8, 9
 """Channels of random numbers; the pressures have the first four."""
 
 
@@ -41,7 +42,7 @@ class Readings(Rows):
 
 
 @helper
-def _converted(value: float, step: float, least: float, most: float) -> float:
+def converted(value: float, step: float, least: float, most: float) -> float:
     """``value`` as a converter with a ``step`` tells it; a step of 0 is no converter."""
     return max(least, min(most, exact.rounded(value, step))) if step > 0.0 else value
 
@@ -108,7 +109,7 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
             if not again:
                 passed[axis, i] = passed[axis, i] + share * (sensed - passed[axis, i]) if share < 1.0 else sensed
             value = passed[axis, i] + noise_of(key, tick, NOISE_OF_FORCE + axis, e.figures.force_noise[i])
-            value = _converted(value, e.force_step[i], -shared.force_range, shared.force_range)
+            value = converted(value, e.force_step[i], -shared.force_range, shared.force_range)
             for k in range(slots if tick == 0 else 1):
                 late[(tick + k) % slots, axis, i] = value
             if read:
@@ -133,7 +134,7 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
             for chamber in range(4):
                 noise = noise_of(key, tick, chamber, e.figures.pressure_noise[i])
                 value = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
-                readings.pressure[chamber, i] = _converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
+                readings.pressure[chamber, i] = converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
         seen.position_time[i] = readings.position_time[i]
         for axis in range(2):
             seen.position[axis, i], seen.velocity[axis, i] = readings.position[axis, i], readings.velocity[axis, i]
@@ -143,28 +144,7 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
     return 0
 
 
-@kernel
-def _put_out(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Make the openings what the board puts out, which is ``last`` (4, N) in a missed period.
-
-    A clock that jitters is late by a fraction of the period, drawn uniformly. What is put out is then the mean of both openings
-    over the period: the spool, with a lag of ``tau``, misses what it would do by at most (T/tau)^2/8 of the change.
-    """
-    mine = slice(lane, lane + n)
-    keys, e, last = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table2(tables, 2)[:, mine]
-    for i in range(n):
-        tick, jitter = int(world.tick[i]), e.figures.clock_jitter[i]
-        missed = tick > 0 and happens(keys[i], tick, MISSED, e.figures.missed_periods[i])
-        late = jitter * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if tick > 0 and jitter > 0.0 else 0.0
-        for valve in range(4):
-            value = _converted(seen.opening[valve, i], e.opening_step[i], -1.0, 1.0)
-            value = last[valve, i] if missed else value
-            seen.opening[valve, i] = value + late * (last[valve, i] - value)
-            last[valve, i] = value
-    return 0
-
-
-class BoardSensors:
+class BoardSensors(SensorModel):
     """A force sensor, a tracker and pressure cells with the errors of ``Electronics``, read by a board that misses periods.
 
     The force: gain, crosstalk and bias of the episode, low-pass, noise, converter, latency. The tracker has a rate of its own,
@@ -230,47 +210,5 @@ class BoardSensors:
         return measurement_of(seen, True, Shared(self._shared).share > 0.0)
 
     def stage(self) -> Stage:
-        """``measure``, compiled into the closed loop."""
         tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)
         return Stage(_look, self._shared, tables=(*tables, self._readings, self._accelerometer))
-
-
-class HonestSensors(BoardSensors):
-    """``BoardSensors`` with all of their errors, whose figures episodes may draw. The valves are commanded through a converter,
-    and stay as they were in a missed period (``board_stage``)."""
-
-    drawn = tuple(f"electronics.{name}" for name in FIGURES)
-
-    def __init__(self, electronics: Electronics, num_envs: int) -> None:
-        super().__init__(electronics, num_envs)
-        self._last: Array = np.zeros((4, num_envs))
-
-    def vary(self, ranges: Mapping[str, tuple[float, float]]) -> None:
-        """From the next episode on draw what ``ranges`` name, as ``"electronics.force_bias"``, uniformly in (low, high)."""
-        self._ranges = {name.removeprefix("electronics."): ranges[name] for name in sorted(ranges)}
-        self._make_room()
-
-    @property
-    def figures(self) -> dict[str, Array]:
-        """Figure -> what the episode of each lane has, (N,)."""
-        return dict(zip(FIGURES, Errors(self._errors).figures.rows, strict=True))
-
-    @property
-    def errors(self) -> Array:
-        """``sensor_errors.Errors`` that the episode of each lane has, (M, N)."""
-        return self._errors
-
-    def shift(self, place: Array) -> Array:
-        """By how much scale and distortion move what the tracker shows of true places, both (2, N), m."""
-        return shift(Errors(self._errors), Shared(self._shared), place)
-
-    def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
-        """What reaches the valves of ``openings`` (4, N): converted, late by the clock's jitter, and not at all in a missed
-        period."""
-        out, tick = np.array(openings, dtype=np.float64, order="C"), np.array(ticks[None], dtype=np.float64)
-        Loop(len(ticks), [(tick, TICK)], [(out, OPENING)], [self.board_stage()]).run()
-        return out
-
-    def board_stage(self) -> Stage:
-        """``put_out``, compiled into the closed loop."""
-        return Stage(_put_out, tables=(self._keys.view(np.float64), self._errors, self._last))

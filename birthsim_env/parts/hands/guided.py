@@ -1,111 +1,22 @@
-"""Hands that keep moving: a sine, noise, and a hand with mass, damper and spring that holds the end effector and guides it.
-
-None of them jumps: whatever they do, the rig can be asked to give way.
-"""
+"""The hand ``guided``: with mass, damper and spring, it holds the end effector and guides it."""
 
 import math
-from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Point
-from birthsim_env.loop.stage import Stage, table2, table3, table4
+from birthsim_env.loop.stage import Stage, table2, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
-from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, CompiledForce, UserForce
-from birthsim_env.parts.references import LONGEST, TURNED, minimum_jerk
+from birthsim_env.parts.hands.user_forces import CompiledForce
+from birthsim_env.parts.references import LONGEST, minimum_jerk
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
-from birthsim_env.physics.rig.values import checked_range, shown
-
-FADE = 0.5
-"""s over which a sine and noise begin, at minimum jerk."""
-
-WAVES = 16
-"""Sines that noise is made of, per axis."""
-
-
-class Wave(Rows):
-    """A sine."""
-
-    amplitude = row("N", "amplitude")
-    rate = row("rad/s", "angular frequency")
-    phase = row("rad", "at the beginning")
-
-
-@kernel
-def _waves(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Table (2, W, 3, N): of each axis the waves, each a ``Wave``."""
-    time, own, force = seen.time, table4(tables, 0)[:, :, :, lane : lane + n], world.force
-    for i in range(n):
-        fraction = minimum_jerk(time[i] / FADE, 0)
-        for axis in range(2):
-            total = 0.0
-            for w in range(own.shape[1]):
-                wave = Wave(own[axis, w])
-                total += wave.amplitude[i] * exact.sine(wave.rate[i] * time[i] + wave.phase[i])
-            force[axis, i] = fraction * total
-    return 0
-
-
-class _Waves(CompiledForce):
-    """Sums of sines."""
-
-    jump_rate = math.inf
-    waves = 1
-
-    def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((2, self.waves, Wave.size, num_envs))
-
-    def stage(self) -> Stage:
-        return Stage(_waves, tables=(self._own,))
-
-
-class Sine(_Waves):
-    """``amplitude`` N at ``frequency`` Hz along ``angle`` (rad from x)."""
-
-    def __init__(self, amplitude: Range = 20.0, frequency: Range = 1.0, angle: Range = 0.0) -> None:
-        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
-        checked_range("frequency", frequency, "Hz", least=0.0, most=FASTEST)
-        checked_range("angle", angle, "rad", least=-TURNED, most=TURNED)
-        self.amplitude, self.frequency, self.angle = amplitude, frequency, angle
-
-    @vectorised
-    def begin(self, lane: int, rng: np.random.Generator) -> None:
-        size, rate, angle = draw(self.amplitude, rng), 2 * math.pi * draw(self.frequency, rng), draw(self.angle, rng)
-        x, y = exact.direction(angle)
-        put(self._own[:, 0, 0], lane, (size * x, size * y))
-        put(self._own[:, 0, 1], lane, (rate, rate))
-
-
-class Noise(_Waves):
-    """Random force of ``rms`` N, the root mean square of its size, with all frequencies of ``band`` (low, high), Hz, alike."""
-
-    waves = WAVES
-
-    def __init__(self, rms: Range = 15.0, band: tuple[float, float] = (0.1, 3.0)) -> None:
-        checked_range("rms", rms, "N", least=0.0, most=STRONGEST)
-        if not isinstance(band, tuple) or checked_range("band", band, "Hz", above=0.0, most=FASTEST)[0] == band[1]:
-            raise ValueError(f"band = {shown(band)}; allowed: (low, high), 0 < low < high (Hz)")
-        self.rms, self.band = rms, band
-
-    @vectorised
-    def begin(self, lane: int, rng: np.random.Generator) -> None:
-        low, high = self.band
-        # One frequency in each of equal parts of the band: none is missing, and no two lanes repeat each other.
-        wave = np.arange(self.waves).reshape(-1, *[1] * np.ndim(lane))
-        parts = low + (high - low) * (wave + rng.uniform(size=(2, self.waves))) / self.waves
-        size, phases = draw(self.rms, rng) / math.sqrt(self.waves), rng.uniform(0, 2 * math.pi, (2, self.waves))
-        for axis, own in enumerate(self._own):
-            put(own[:, 0], lane, [size] * self.waves)
-            put(own[:, 1], lane, 2 * math.pi * parts[axis])
-            put(own[:, 2], lane, phases[axis])
-
-
-FASTEST = 100.0
-"""Hz: hands move at a few, and a control period is a ms."""
+from birthsim_env.physics.rig.values import checked_range
+from birthsim_env.registry import register
 
 CALM = 1.0
 """s for which the guiding hand holds still at first."""
@@ -185,6 +96,7 @@ def _held(motion: Point, hand: Hand, grip: Grip, axis: int, i: int) -> float:
     return pull
 
 
+@register(hand="guided", about="A hand with mass, damper and spring that leads the head from place to place.", order=4)
 class Guided(CompiledForce):
     """A hand that holds the end effector and leads it from place to place.
 
@@ -212,6 +124,10 @@ class Guided(CompiledForce):
         checked_range("lasts", lasts, "s", least=0.1, most=LONGEST)
         self.mass, self.stiffness, self.reach, self.lasts = mass, stiffness, reach, lasts
 
+    @classmethod
+    def varied(cls) -> Self:
+        return cls(mass=(0.6, 1.6), stiffness=(150.0, 600.0), lasts=(1.5, 3.0))
+
     def prepare(self, num_envs: int) -> None:
         self._own: Array = np.ones((Arm.size, num_envs))
         self._points: Array = np.zeros((POINTS, 2, num_envs))
@@ -229,14 +145,3 @@ class Guided(CompiledForce):
 
     def stage(self) -> Stage:
         return Stage(_guide, np.array(self.GRIP), self._state, (self._own, self._points))
-
-
-_ANYWHERE = (0.0, 2 * math.pi)
-
-HANDS: dict[str, tuple[Callable[[], UserForce], Callable[[], UserForce]]] = {
-    "steps": (AlternatingSteps, lambda: AlternatingSteps(amplitude=(10.0, 40.0), repeats=3)),
-    "sine": (Sine, lambda: Sine(amplitude=(10.0, 30.0), frequency=(0.3, 2.0), angle=_ANYWHERE)),
-    "noise": (Noise, lambda: Noise(rms=(8.0, 20.0))),
-    "guided": (Guided, lambda: Guided(mass=(0.6, 1.6), stiffness=(150.0, 600.0), lasts=(1.5, 3.0))),
-}
-"""Name -> makers of a hand: as it is, and varied from episode to episode."""
