@@ -37,12 +37,12 @@ def _scores() -> dict[str, Any]:
 
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
-    """What is known of an environment: role (``ROLES``) -> figures.
+    """What is known of an environment: role (``ROLES``) -> values.
 
-    The figures are the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over
+    The values are the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over
     episodes of the settled error; None where most are lost), and the fractions ``lost`` and ``success``.
 
-    The figures are of the id with its default arguments, apart from ``sensors`` and ``randomize`` (rig and scenario together,
+    They are of the id with its default arguments, apart from ``sensors`` and ``randomize`` (rig and scenario together,
     or neither). An environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no
     scores.
     """

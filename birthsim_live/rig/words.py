@@ -1,4 +1,4 @@
-"""What the page says of itself: its figures and plots, its choices, and where it comes from."""
+"""What the page says of itself: its numbers and plots, its choices, and where it comes from."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

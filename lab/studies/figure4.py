@@ -11,8 +11,8 @@ from lab.studies.tables import markdown
 
 
 def measure(controller: str) -> Result:
-    """``figures_of`` the experiment with ideal sensors."""
-    return figures_of(record_run(controller), Parameters())
+    """``metrics_of`` the experiment with ideal sensors."""
+    return metrics_of(record_run(controller), Parameters())
 
 
 def _tasks(options: Options) -> dict[Any, Task]:

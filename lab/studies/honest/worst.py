@@ -21,7 +21,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from birthsim_env.physics.rig.values import checked_number
 from lab.studies.comparison.grid import as_described
-from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
+from lab.studies.honest.search import Seeds, drawn_places, hardest, parameters_at, rigs_at
 from lab.studies.results import Content
 from lab.studies.study import Options, Study
 from lab.studies.tables import markdown
@@ -64,7 +64,7 @@ def worst(
     order = np.argsort(-sizes, kind="stable")
     begun = seeds, places, _bearable(done, metric)
     found, where = hardest(lambda *world: _bearable(run(*world), metric), *begun, episodes, seed)
-    figures = {name: float(value) for name, value in figures_at(where, ranges).items()}
+    figures = {name: float(value) for name, value in parameters_at(where, ranges).items()}
     return {
         "controller": controller, "sensors": sensors,
         **{name: jsonable([quantile(sizes_of(done, name), part) for part in (0.5, 0.95, 1.0)]) for name in (metric, "unrest")},

@@ -106,8 +106,8 @@ def _kept(options: Options, found: Found) -> Any:
         together = [*controllers, merged(seeds, f"residual, {len(seeds)} seeds")]
         felt_of = [[pieces[one.controller][-1]] for one in controllers] + [[pieces[one.controller][-1] for one in seeds]]
         kept[policy] = {
-            "beside": {one.controller: seed_figures(one, seeds) for one in controllers},
-            "felt": {one.controller: felt.figures_of(own) for one, own in zip(together, felt_of, strict=True)},
+            "beside": {one.controller: seed_metrics(one, seeds) for one in controllers},
+            "felt": {one.controller: felt.metrics_of(own) for one, own in zip(together, felt_of, strict=True)},
             "metrics": {"columns": list(DATA), "rows": list(csv.reader(io.StringIO(data(together))))[1:]},
         }
     return jsonable(kept)
