@@ -3,7 +3,7 @@
 from typing import Any
 
 from baselines.work.tasks import Result, Task
-from birthsim.commands.figure4 import figures_of, record_run
+from birthsim.commands.figure4 import metrics_of, record_run
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.results import Content
 from lab.studies.study import Options, Study

@@ -11,7 +11,7 @@ from baselines.bench.evaluation import Evaluation, overview
 from baselines.figures import runs as figures
 from baselines.figures.runs import error_over_time
 from birthsim.commands import figure4 as figure4_command
-from birthsim.commands.figure4 import FIELDS, figures_of, record_run
+from birthsim.commands.figure4 import FIELDS, metrics_of, record_run
 from birthsim_env import Parameters
 from tests.console import assert_picture, call, strict
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from agents.policy.files import WEIGHTS
 from agents.policy.pieces import evaluate_learned
-from agents.policy.seeds import as_table, policy_folders, seed_figures
+from agents.policy.seeds import as_table, policy_folders, seed_metrics
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
 from baselines.bench.statistics import jsonable
