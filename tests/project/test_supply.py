@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import birthsim_env
-from birthsim.door import COMMANDS
+from birthsim.main import COMMANDS
 from tests.console import ROOT
 
 LOCKS = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "packaging" / "requirements").glob("*.txt")}
