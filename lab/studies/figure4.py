@@ -1,4 +1,4 @@
-"""The figures of the paper's Fig. 4, whose picture ``birthsim figure4`` draws."""
+"""The metrics of the paper's Fig. 4, whose picture ``birthsim figure4`` draws."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "figure", "x or 1", "y or 2"]]
+    rows = [["controller", "metric", "x or 1", "y or 2"]]
     for controller, figures in content["figures"].items():
         for name, values in figures.items():
             if isinstance(values, list):

@@ -131,13 +131,14 @@ def _number(value: float | None) -> float:
 
 
 def tables(content: Content, name: str) -> dict[str, str]:
-    """The overview, the losses where there are several environments, and every figure as CSV."""
+    """The overview, the losses where there are several environments, and every metric as CSV."""
     figures, settings = cells_of(content), content["settings"]
     several = len({cell["environment"] for cell in figures}) > 1
     parts = [
         f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad.",
         overview(figures), *([losses(figures)] if several else []),
-        f"Every figure, with its interval, its worst episode and its ratio to the paper's law: [{name}.csv](data/{name}.csv)",
+        "Every metric, with its interval, its worst episode and its ratio to that of the paper's controller: "
+        f"[{name}.csv](data/{name}.csv)",
     ]  # fmt: skip
     return {f"{name}.md": "\n\n".join(parts) + "\n", f"{name}.csv": data(figures)}
 

@@ -117,7 +117,7 @@ def _shown(content: Content) -> dict[str, str]:
     rows = [[*head, named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
     names = list(content["figures"][0]["found"]["figures"])
     worlds = [[*head, "found in world", "push, N", "mm asked for", "% of the strength", *names]]
-    changed = [[*head, "figure", "of the world found", "put to", named]]
+    changed = [[*head, "parameter", "of the world found", "put to", named]]
     for row in content["figures"]:
         own, found = [row["controller"], row["sensors"]], row["found"]
         sizes = [", ".join(map(_number, row[name])) for name in (metric, "unrest")]

@@ -128,7 +128,8 @@ def _shown(content: Content) -> dict[str, str]:
 
 def _summary(figures: dict[str, Any]) -> str:
     """Pooled errors of each scenario's policy beside its controllers."""
-    head = ["scenario", "paper's law, mm", "controller underneath, mm", "with the residual, mm", "less than the paper's law, %"]
+    paper = "paper's controller"
+    head = ["scenario", f"{paper}, mm", "controller underneath, mm", "with the residual, mm", f"less than the {paper}, %"]
     lines = [head, ["---"] * len(head)]
     shown = [policy for policy in ("circle", "probe", "forceps", "dystocia", "descent") if policy in figures]
     for policy in shown:
