@@ -1,4 +1,4 @@
-# make quick  lints, and runs the contracts and the stored bits: half a minute, between two edits
+# make quick  lints, and runs the contracts and the stored trajectories: half a minute, between two edits
 # make run    installs, reproduces Fig. 4, trains a residual policy and, by gradients, a controller from scratch, and evaluates them
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
@@ -82,13 +82,13 @@ $(TOOLS)/.ready: packaging/requirements/tools.txt
 # PyTorch is installed while Fig. 4 is computed.
 run: $(BASE)
 	@$(MAKE) --no-print-directory --jobs 2 figure $(AGENTS)
-	@echo "== 2 of 4: a residual policy on top of a law, half a minute to two minutes"
+	@echo "== 2 of 4: a residual policy on top of a controller, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim train --config circle_quick --seed 0 --out $(OUT)/policy
 	@echo "== 3 of 4: a controller from scratch, by gradients through the closed loop, some 20 s"
 	rm -rf $(OUT)/scratch
 	$(BIN)/birthsim train --config circle_apg --steps 300000 --seed 0 --out $(OUT)/scratch
-	@echo "== 4 of 4: the paper's law, the best law, the controller from scratch and the residual on 64 episodes that training never saw"
+	@echo "== 4 of 4: the paper's controller, the best one, the controller from scratch and the residual on 64 episodes that training never saw"
 	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual:$(OUT)/scratch residual --policy $(OUT)/policy \
 	  --episodes 64 --seed 10000 --out $(OUT)/evaluation
 	@echo "== What to try next"
@@ -108,7 +108,7 @@ test-slow: $(READY)
 	$(BIN)/python -m tests.warming
 	$(PYTEST) -m slow
 
-# Between two edits: what changed, the laws of the project, and the stored bits.
+# Between two edits: what changed, the order of the packages, and the stored trajectories.
 quick: $(READY)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy

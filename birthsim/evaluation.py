@@ -68,12 +68,12 @@ def run(settings: Settings) -> None:
     classical, learned = evaluations[:known], evaluations[known:]
     seeds, pictures = "", "error_over_time"
     if len(learned) > 1:
-        from agents.policy.seeds import as_table, seed_figures
+        from agents.policy.seeds import as_table, seed_metrics
         from agents.reports.learning_curves import draw_learning_curves, learning_curves
 
         together = merged(learned, f"residual, {len(learned)} seeds")
         evaluations = [*classical, together]
-        seeds = "".join(f"\n{as_table(seed_figures(one, learned))}\n" for one in classical)
+        seeds = "".join(f"\n{as_table(seed_metrics(one, learned))}\n" for one in classical)
         pictures += ", learning_curves"
     lines = [caption, "", overview(evaluations)]
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]

@@ -97,7 +97,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       observation is computed with that.
     - `randomize`: what every episode draws anew. `False`: nothing. `"plant"`: the rig, from ranges about the one described
       (`birthsim_env.parts.drawn.randomization`). `"scenario"`: the experiment. `True`: both. `"sensors"`: the experiment, and
-      the figures of `honest` sensors alone. A mapping such as `{"mechanics.mass": (2, 5)}` draws just these parameters.
+      the parameters of realistic sensors (`honest`) alone. A mapping such as `{"mechanics.mass": (2, 5)}` draws just these
+      parameters.
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
     - `user_force`: the hand, instead of the scenario's. A `UserForce`; a function of time, or of time, position and velocity,

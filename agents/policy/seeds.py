@@ -22,7 +22,7 @@ SHOWN = ("settled_rms", "settled_rms_x", "settled_rms_y", "stiffness_error", "hu
 
 
 COLUMNS = ("metric", "unit", "statistic", "law", "residual", "low", "high")
-"""Of ``seed_figures``; low and high are the residual's interval."""
+"""Of ``seed_metrics``; low and high are the residual's interval."""
 
 
 def policy_folders(path: str | os.PathLike[str]) -> list[Path]:
@@ -123,7 +123,7 @@ def pooled(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(penalize_lost(values, np.isinf(values), True, LOST_ERROR)))))
 
 
-def seed_figures(law: Evaluation, residuals: Sequence[Evaluation]) -> dict[str, Any]:
+def seed_metrics(law: Evaluation, residuals: Sequence[Evaluation]) -> dict[str, Any]:
     """Law and residual over training seeds, on the episodes that the rig's strength suffices for, as JSON takes it.
 
     ``rows`` have ``COLUMNS``: interquartile means with 95 % bootstrap intervals over seeds and episodes, what the residual
@@ -138,8 +138,8 @@ def seed_figures(law: Evaluation, residuals: Sequence[Evaluation]) -> dict[str, 
     def add(metric: str, name: str, statistic: Callable[[Array], float]) -> None:
         matrix = np.stack([sizes(one, metric) for one in residuals])[:, feasible]
         if not np.isnan(matrix).all():
-            figures = [statistic(sizes(law, metric)[feasible]), statistic(matrix)]
-            rows.append([metric, UNITS[metric], name, *figures, *crossed_interval(statistic, matrix)])
+            metrics = [statistic(sizes(law, metric)[feasible]), statistic(matrix)]
+            rows.append([metric, UNITS[metric], name, *metrics, *crossed_interval(statistic, matrix)])
 
     for metric in SHOWN:
         add(metric, "interquartile mean", interquartile_mean)
@@ -169,7 +169,7 @@ def seed_figures(law: Evaluation, residuals: Sequence[Evaluation]) -> dict[str, 
 
 
 def as_table(found: dict[str, Any]) -> str:
-    """Markdown of what ``seed_figures`` gives."""
+    """Markdown of what ``seed_metrics`` gives."""
     lines = [
         f"{found['within']} of {found['episodes']} episodes are within the rig's strength; {found['seeds']} training seeds.",
         "",

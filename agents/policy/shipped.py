@@ -41,7 +41,7 @@ def _register(folder: Path) -> None:
     """The policies of a folder of seeds, by what their training says."""
     training = json.loads(next(folder.glob("seed_*/training.json")).read_text(encoding="utf-8"))["settings"]
     needs = {AGENTS, "force sensor"} if training.get("force_sensor", True) else {AGENTS}
-    about = f"A law and a trained policy that corrects it: {folder.name}."
+    about = f"A controller and a trained policy that corrects it: {folder.name}."
     register(policy=folder.name, about=about, needs=needs)(folder)
 
 

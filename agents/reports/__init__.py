@@ -1,1 +1,1 @@
-"""What policies have learned, in figures."""
+"""What policies have learned, in pictures and numbers."""

@@ -66,7 +66,7 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
     """The text of ``README.md`` beside a policy, from what ``compared`` found."""
     policy = load_policy(folder)
     about = settings_of(folder)
-    whom, columns = [one.controller for one in evaluations], [figures(one) for one in evaluations]
+    whom, columns = [one.controller for one in evaluations], [metrics(one) for one in evaluations]
     rows = {key: [column[key] for column in columns] for key in FIGURES if np.isfinite(columns[0][key])}
     result = {
         "task": {"type": "reinforcement-learning", "name": "stiffness control"},
@@ -122,8 +122,8 @@ def settings_of(folder: Path) -> dict[str, Any]:
     return settings
 
 
-def figures(evaluation: Evaluation) -> dict[str, float]:
-    """The figures of a card over the episodes that the rig's strength suffices for; a lost one is infinitely bad."""
+def metrics(evaluation: Evaluation) -> dict[str, float]:
+    """The metrics of a card over the episodes that the rig's strength suffices for; a lost one is infinitely bad."""
     feasible = np.asarray(evaluation.required_strength_ratio) < 1.0
     found = {"lost": 100 * float(np.mean(np.asarray(evaluation.lost)[feasible]))}
     for metric, statistic in (key.split() for key in FIGURES if key != "lost"):
@@ -133,7 +133,7 @@ def figures(evaluation: Evaluation) -> dict[str, float]:
 
 
 def _said(who: str, rows: dict[str, list[float]], column: int) -> str:
-    """In which figures the policy is better and worse than the one of a column."""
+    """In which metrics the policy is better and worse than the one of a column."""
     better = "; ".join(FIGURES[key][0] for key, row in rows.items() if row[0] < row[column])
     worse = "; ".join(FIGURES[key][0] for key, row in rows.items() if row[0] > row[column])
     return f"Beside `{who}` it is better in: {better or 'nothing'}. It is worse in: {worse or 'nothing'}."

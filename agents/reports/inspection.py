@@ -140,10 +140,10 @@ def rendered(controllers: Sequence[tuple[str, Controller]], seed: int = 0) -> li
         probes = StiffnessTest(position, force, stiffness, rigs, pneumatic)
         for name, controller in controllers:
             answers = run_stiffness_test(probes, controller, seed=seed)
-            figures = {"error_percent": np.abs(100 * answers.stiffness_error(force))}
-            figures |= {f"hunting_{axis}_mm": 1e3 * answers.hunting[k] for k, axis in enumerate("xy")}
+            metrics = {"error_percent": np.abs(100 * answers.stiffness_error(force))}
+            metrics |= {f"hunting_{axis}_mm": 1e3 * answers.hunting[k] for k, axis in enumerate("xy")}
             row = {"setpoint": setpoint, "controller": name, "lost": int(answers.lost.sum()), "cases": len(cases)}
-            for label, values in figures.items():
+            for label, values in metrics.items():
                 row |= {f"{label}_{key}": quantile(values, fraction) for key, fraction in (("median", 0.5), ("q95", 0.95))}
             rows.append(row)
     return rows

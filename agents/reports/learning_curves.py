@@ -38,15 +38,15 @@ def learning_curves(folders: Sequence[Path]) -> list[dict[str, Any]]:
     return [read_json("policy", file, _TRAINING) for file in files if file.is_file()]
 
 
-def over_seeds(trainings: Sequence[dict[str, Any]], figure: str) -> tuple[Array, Array]:
-    """Steps (T,), and interquartile mean and both ends of its 95 % interval (3, T) of ``figure`` over the trainings.
+def over_seeds(trainings: Sequence[dict[str, Any]], metric: str) -> tuple[Array, Array]:
+    """Steps (T,), and interquartile mean and both ends of its 95 % interval (3, T) of ``metric`` over the trainings.
 
-    Up to where the shortest of them ends. NaN where an interval's figure says nothing.
+    Up to where the shortest of them ends. NaN where an interval says nothing.
     """
     length = min(len(training["curve"]) for training in trainings)
     steps = np.array([point["steps"] for point in trainings[0]["curve"][:length]], dtype=np.float64)
     values = np.array(
-        [[_number(point[figure]) for point in training["curve"][:length]] for training in trainings], dtype=np.float64
+        [[_number(point[metric]) for point in training["curve"][:length]] for training in trainings], dtype=np.float64
     )
     rows = [
         (interquartile_mean(column), *crossed_interval(interquartile_mean, column[:, None]))

@@ -1,4 +1,4 @@
-"""What a privileged policy observes besides: the true figures of the rig that was drawn, and what its sensors do wrong.
+"""What a privileged policy observes besides: the true parameters of the rig that was drawn, and what its sensors do wrong.
 
 No controller can know them. A policy that does says what is left to be learned by one that guesses them from measurements.
 """
@@ -22,31 +22,31 @@ DRAWN = (at.MASS, at.FC1, at.FC2, at.FV1, at.FV2, at.TAU, at.DEAD_VOLUME, at.H_W
 PRESSURE_UNIT, PLACE_UNIT = 2000.0, 1e-3
 """Pa and m that are observed as 1: the default bias of a pressure cell, and the default distortion of the tracker."""
 
-FIGURES = len(DRAWN) + 6
+TRUE_PARAMETERS = len(DRAWN) + 6
 """How many numbers these are."""
 
 
-def true_figures(env: Any) -> NDArray[np.float32]:
+def true_parameters(env: Any) -> NDArray[np.float32]:
     """Of the lanes of a vector environment now, (N, FIGURES): the parameters ``DRAWN`` over those that the owner describes; the
     biases of the four pressure cells; and by how much scale and distortion move the place that the tracker shows, x and y.
 
     Without ``honest`` sensors the last six are zero.
     """
     simulation, rows = env.simulation, list(DRAWN)
-    figures: Array = np.zeros((FIGURES, env.num_envs))
-    figures[: len(rows)] = simulation.plant.lane_parameters[rows] / simulation.nominal[rows, None]
+    parameters: Array = np.zeros((TRUE_PARAMETERS, env.num_envs))
+    parameters[: len(rows)] = simulation.plant.lane_parameters[rows] / simulation.nominal[rows, None]
     if isinstance(simulation.sensors, HonestSensors):
-        figures[len(rows) : -2] = Errors(simulation.sensors.errors).cells / PRESSURE_UNIT
-        figures[-2:] = simulation.sensors.shift(simulation.motion[:2]) / PLACE_UNIT
-    return figures.T.astype(np.float32)
+        parameters[len(rows) : -2] = Errors(simulation.sensors.errors).cells / PRESSURE_UNIT
+        parameters[-2:] = simulation.sensors.shift(simulation.motion[:2]) / PLACE_UNIT
+    return parameters.T.astype(np.float32)
 
 
-def with_figures(env: Any, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Observations (N, D) of a vector environment with its ``true_figures``, (N, D + FIGURES)."""
-    return np.concatenate([observations, true_figures(env)], axis=1)
+def with_true_parameters(env: Any, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Observations (N, D) of a vector environment with its ``true_parameters``, (N, D + FIGURES)."""
+    return np.concatenate([observations, true_parameters(env)], axis=1)
 
 
 def acting(policy: PolicyFunction, env: Any, privileged: bool) -> PolicyFunction:
     """What a ``policy`` does in ``env``: observations (N, D) -> actions (N, size); a ``privileged`` one observes
-    the true figures too."""
-    return (lambda seen: policy(with_figures(env, seen))) if privileged else policy
+    the true parameters too."""
+    return (lambda seen: policy(with_true_parameters(env, seen))) if privileged else policy

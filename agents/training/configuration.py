@@ -48,7 +48,7 @@ class TrainingSettings:
     after a space the name of a hand where it is not the scenario's. The learning rate falls linearly to a hundredth. The
     training ends early once the pooled settled error of its policy in validation is ``until`` percent below that of the
     paper's law; with 100 it never ends early. Training draws rigs that oscillate more easily than those of validation, by a
-    ``margin`` (``agents.training.margin``). A ``privileged`` policy observes the true figures of the rig
+    ``margin`` (``agents.training.margin``). A ``privileged`` policy observes the true parameters of the rig
     (``agents.residual.privileged``), and runs in no controller.
     Raises ``ValueError`` naming what cannot be.
     """

@@ -109,14 +109,14 @@ class PolicyGradient:
             if not skipped and (reached.is_due(self.steps) or ends):
                 started, network = time.perf_counter(), self.network()
                 # A policy that has learned nothing says zero.
-                figures = reached.validate(network) if self.steps else dict(reached.figures["law"])
+                metrics = reached.validate(network) if self.steps else dict(reached.metrics["law"])
                 validating += time.perf_counter() - started
                 seconds = time.perf_counter() - began
                 about = self._about(before + seconds, max(seconds - validating, 1e-9))
-                best = reached.add(network, figures, about)
-                for name, value in reached.events(figures).items():
+                best = reached.add(network, metrics, about)
+                for name, value in reached.events(metrics).items():
                     writer.add_scalar(name, value, self.steps)
-                bar.set_postfix_str(reached.words(figures))
+                bar.set_postfix_str(reached.words(metrics))
                 self._save(reached)
                 if best:
                     reached.keep()

@@ -38,18 +38,18 @@ class Reached:
     ) -> None:
         self._settings, self._residual, self.envs, self._folder = settings, residual, envs, folder
         if past is None:
-            self.figures: dict[str, Any] = {"law": self._without_policy(envs), "policy": None, "curve": []}
-            self.figures["paper"] = self._without_policy(paper) if paper is not None else None
+            self.metrics: dict[str, Any] = {"law": self._without_policy(envs), "policy": None, "curve": []}
+            self.metrics["paper"] = self._without_policy(paper) if paper is not None else None
             self._due, self._best = 0.0, b""
-            if self.figures["law"]["infeasible"] == settings.validation_lanes:
+            if self.metrics["law"]["infeasible"] == settings.validation_lanes:
                 raise ValueError(
                     f"all {settings.validation_lanes} validation worlds ask for more than the rig's strength, so that no "
                     "policy could be told from another; allowed: a stronger rig, milder randomization, or another environment"
                 )
         else:
-            self.figures, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
+            self.metrics, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
             self.keep()
-        curve = self.figures["curve"]
+        curve = self.metrics["curve"]
         self.seconds: float = curve[-1]["seconds"] if curve else 0.0
 
     def is_due(self, steps: int) -> bool:
@@ -63,7 +63,7 @@ class Reached:
     @property
     def enough(self) -> bool:
         """Whether the best policy is as far below the paper's law as the training shall get."""
-        paper, best = self.figures["paper"], self.figures["policy"]
+        paper, best = self.metrics["paper"], self.metrics["policy"]
         if paper is None or best is None:
             return False
         return bool(best["pooled_mm"] <= (1 - self._settings.until / 100) * paper["pooled_mm"])
@@ -71,7 +71,7 @@ class Reached:
     def validate(self, network: PolicyNetwork) -> dict[str, float]:
         """Figures of a policy."""
         privileged = self._settings.privileged
-        return self._figures([(env, acting(network.acting(), env, privileged)) for env in self.envs])
+        return self._metrics([(env, acting(network.acting(), env, privileged)) for env in self.envs])
 
     def _without_policy(self, envs: Sequence[Any]) -> dict[str, float]:
         """Figures of the law alone: actions of zero."""
@@ -79,56 +79,56 @@ class Reached:
         def zero(env: Any) -> PolicyFunction:
             return lambda seen: np.zeros((len(seen), *env.single_action_space.shape), dtype=np.float32)
 
-        return self._figures([(env, zero(env)) for env in envs])
+        return self._metrics([(env, zero(env)) for env in envs])
 
-    def _figures(self, worlds: Sequence[tuple[Any, PolicyFunction]]) -> dict[str, float]:
+    def _metrics(self, worlds: Sequence[tuple[Any, PolicyFunction]]) -> dict[str, float]:
         return joined([validate(env, act, target=self._settings.target) for env, act in worlds]).to_dict()
 
-    def add(self, network: PolicyNetwork, figures: dict[str, float], about: dict[str, Any]) -> bool:
+    def add(self, network: PolicyNetwork, metrics: dict[str, float], about: dict[str, Any]) -> bool:
         """Add to the curve; returns whether the policy is the best so far, for ``keep`` once a checkpoint holds it."""
-        self.figures["curve"].append({**about, **figures})
-        best = self.figures["policy"]
-        if best is not None and merit(figures) >= merit(best):
+        self.metrics["curve"].append({**about, **metrics})
+        best = self.metrics["policy"]
+        if best is not None and merit(metrics) >= merit(best):
             return False
-        self.figures["policy"] = figures
-        training = {**self._settings.to_dict(), "law": self.figures["law"], "reached": figures}
+        self.metrics["policy"] = metrics
+        training = {**self._settings.to_dict(), "law": self.metrics["law"], "reached": metrics}
         self._best = policy_content(Policy(network, self._settings.environment, self._residual, training))
         return True
 
     def past(self) -> dict[str, Any]:
         """What a checkpoint holds of it, with the best policy: the file that follows is the same or is written anew after a
         kill."""
-        return {"reached": self.figures, "due": self._due, "best": np.frombuffer(self._best, dtype=np.uint8)}
+        return {"reached": self.metrics, "due": self._due, "best": np.frombuffer(self._best, dtype=np.uint8)}
 
     def keep(self) -> None:
         """Write the best policy so far."""
         save_policy(self._best, self._folder)
 
-    def events(self, figures: dict[str, float]) -> dict[str, float]:
+    def events(self, metrics: dict[str, float]) -> dict[str, float]:
         """What TensorBoard shows of a validation."""
-        law, shown = self.figures["law"], [name for name in LOGGED if np.isfinite(figures[name])]
+        law, shown = self.metrics["law"], [name for name in LOGGED if np.isfinite(metrics[name])]
         return {
-            **{f"validation/{name}": figures[name] for name in shown},
+            **{f"validation/{name}": metrics[name] for name in shown},
             **{f"validation/{name}_law": law[name] for name in shown},
-            "validation/better_than_law_percent": self.better(figures),
+            "validation/better_than_law_percent": self.better(metrics),
         }
 
-    def better(self, figures: dict[str, float]) -> float:
+    def better(self, metrics: dict[str, float]) -> float:
         """How far a pooled error is below the law's, %."""
-        return float(100 * (1 - figures["pooled_mm"] / self.figures["law"]["pooled_mm"]))
+        return float(100 * (1 - metrics["pooled_mm"] / self.metrics["law"]["pooled_mm"]))
 
-    def words(self, figures: dict[str, float]) -> str:
+    def words(self, metrics: dict[str, float]) -> str:
         """A validation beside a progress bar."""
-        law = self.figures["law"]["pooled_mm"]
-        return f"error {figures['pooled_mm']:.2f} mm, law {law:.2f} mm, {self.better(figures):+.0f} % better"
+        law = self.metrics["law"]["pooled_mm"]
+        return f"error {metrics['pooled_mm']:.2f} mm, law {law:.2f} mm, {self.better(metrics):+.0f} % better"
 
     def describe(self) -> dict[str, Any]:
         """The settings that a checkpoint must share."""
         return described(self._settings, self._residual, self.envs[0].simulation.parameters)
 
     def result(self) -> dict[str, Any]:
-        """Validation figures of the law and of the kept policy, and the learning curve."""
-        return {"settings": self.describe(), **self.figures}
+        """Validation metrics of the controller and of the kept policy, and the learning curve."""
+        return {"settings": self.describe(), **self.metrics}
 
 
 def described(settings: TrainingSettings, residual: ResidualSettings, rig: Parameters) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A recurrent student imitates a privileged teacher from measurements alone, without the true figures that the teacher sees.
+"""A recurrent student imitates a privileged teacher from measurements alone, without the true parameters that the teacher sees.
 
 DAgger (Ross, Gordon and Bagnell 2011): the teacher says at every step what it would do, while from the second round on the
 student acts. The student is a gated recurrent unit (GRU), as in RAPTOR (arXiv 2509.11481).
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork, Statistics
-from agents.residual.privileged import with_figures
+from agents.residual.privileged import with_true_parameters
 from agents.training.validation import TRAINING_SEED, Score, validate
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -118,7 +118,7 @@ def _round(env: Any, teacher: Policy, network: PolicyNetwork, seed: int, shown: 
     seen, _ = env.reset(seed=seed)
     acts, shows, alive, steps = network.acting(), teacher.network.acting(), np.ones(env.num_envs, dtype=np.bool_), []
     for _ in range(env.steps):
-        right = shows(with_figures(env, seen))
+        right = shows(with_true_parameters(env, seen))
         steps.append((network.normalized(seen).astype(np.float32), right, alive))
         seen, _, terminated, _, _ = env.step(right if shown else acts(seen))
         alive = alive & ~terminated

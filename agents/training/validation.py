@@ -65,7 +65,7 @@ class Score:
         return quantile(self.error[self.feasible], 0.95)
 
     def to_dict(self) -> dict[str, float]:
-        """The figures of a learning curve; medians where nothing else is said, NaN without a feasible lane."""
+        """The metrics of a learning curve; medians where nothing else is said, NaN without a feasible lane."""
 
         def over_lanes(values: Lanes, fraction: float = 0.5) -> float:
             return quantile(values[self.feasible], fraction)
@@ -83,9 +83,9 @@ class Score:
         }
 
 
-def merit(figures: dict[str, float]) -> float:
+def merit(metrics: dict[str, float]) -> float:
     """What is to be small: pooled error and its tail together, since the tail is what a mean hides."""
-    return figures["pooled_mm"] + figures["tail_mm"]
+    return metrics["pooled_mm"] + metrics["tail_mm"]
 
 
 def joined(scores: Sequence[Score]) -> Score:

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
-from baselines.bench.metrics import UNITS, figures_of
+from baselines.bench.metrics import UNITS, metrics_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import CommandFunction, Controller, controller_of
 from baselines.registry import make_controller
@@ -97,7 +97,7 @@ class Evaluation:
         return {name: summarize(penalize_lost(values, self.lost)) for name, values in self.metrics.items()}
 
     def to_dict(self) -> dict[str, Any]:
-        """What goes into the JSON file; ``summary`` says "lost" where a figure is infinite."""
+        """What goes into the JSON file; ``summary`` says "lost" where a metric is infinite."""
         return {
             "controller": self.controller,
             "seeds": self.seeds,
@@ -257,7 +257,7 @@ def _run_batch(
     bar.close()
     spent += times_of(driver, simulation)
     env.close()
-    for name, values in figures_of(own, period).items():
+    for name, values in metrics_of(own, period).items():
         result.metrics[name] += values.tolist()
     result.seeds += seeds
     result.required_strength_ratio += asked.tolist()
@@ -280,8 +280,8 @@ def overview(evaluations: list[Evaluation]) -> str:
     rows, unsaid = [], []
     for one in evaluations:
         summary = one.settled_error()
-        figures = [number(summary[key]) for key in ("median", "q95", "max")]
-        rows.append([one.controller, *figures, f"{sum(one.lost)} of {len(one.lost)}"])
+        metrics = [number(summary[key]) for key in ("median", "q95", "max")]
+        rows.append([one.controller, *metrics, f"{sum(one.lost)} of {len(one.lost)}"])
         # A hand that jumps all the time leaves nothing settled.
         never = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())
         if never:
@@ -293,7 +293,7 @@ DATA = ("metric", "unit", "controller", "value", "q95", "max")
 """Columns: the median over the episodes, their 95th percentile and the largest; of lost and successful episodes the number."""
 
 
-def _figures(evaluations: Sequence[Evaluation]) -> Iterator[tuple[str, ...]]:
+def _metrics(evaluations: Sequence[Evaluation]) -> Iterator[tuple[str, ...]]:
     """Rows of ``DATA``, metric by metric; those of which the environment says nothing are left out, "lost" is infinite."""
     summaries = [one.summary() for one in evaluations]
     for name, unit in UNITS.items():
@@ -309,10 +309,10 @@ def _figures(evaluations: Sequence[Evaluation]) -> Iterator[tuple[str, ...]]:
 
 
 def table(evaluations: Sequence[Evaluation]) -> str:
-    """The figures in Markdown: a row per metric, three columns per controller."""
+    """The metrics in Markdown: a row per metric, three columns per controller."""
     head = ["metric", "unit", *(text for one in evaluations for text in (f"{one.controller}: median", "95 %", "max"))]
     lines = []
-    for name, rows in groupby(_figures(evaluations), key=itemgetter(0)):
+    for name, rows in groupby(_metrics(evaluations), key=itemgetter(0)):
         line = [name, UNITS.get(name, "")]
         for _, unit, _, value, *others in rows:
             line += [value if line[1] else f"{value} {unit}".rstrip(), *others]
@@ -321,7 +321,7 @@ def table(evaluations: Sequence[Evaluation]) -> str:
 
 
 def data(evaluations: Sequence[Evaluation]) -> str:
-    """The figures as CSV with the columns ``DATA``."""
+    """The metrics as CSV with the columns ``DATA``."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([DATA, *_figures(evaluations)])
+    csv.writer(text, lineterminator="\n").writerows([DATA, *_metrics(evaluations)])
     return text.getvalue()

@@ -216,10 +216,10 @@ class EpisodeMetrics:
 
     def result(self) -> dict[str, Array]:
         """Every metric of ``UNITS`` per lane, (N,); NaN where an episode says nothing about it."""
-        return figures_of(self._tally, self._period)
+        return metrics_of(self._tally, self._period)
 
 
-def figures_of(tally: Tally, period: float) -> dict[str, Array]:
+def metrics_of(tally: Tally, period: float) -> dict[str, Array]:
     """Every metric of ``UNITS`` per lane, (N,), of a tally sampled every ``period`` s."""
     count, settled_count, quiet = tally.count, tally.settled_count, tally.quiet_time
     with np.errstate(invalid="ignore", divide="ignore"):

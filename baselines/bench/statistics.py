@@ -1,7 +1,7 @@
 """Statistics over episodes, in which a lost episode is infinitely bad, or as bad as ``LOST_ERROR`` where errors are pooled.
 
-An episode that ends early has figures only up to its end, and those may well be good ones. So that a controller gains
-nothing by losing an episode, every figure of a lost episode counts as infinite: medians and quantiles that lean on one are
+An episode that ends early has metrics only up to its end, and those may well be good ones. So that a controller gains
+nothing by losing an episode, every metric of a lost episode counts as infinite: medians and quantiles that lean on one are
 infinite too, and print as "lost". NaN is an episode that says nothing about a metric; it counts nowhere.
 """
 
@@ -87,7 +87,7 @@ def given_in(values: ArrayLike) -> Array:
 
 
 def number(value: float) -> str:
-    """A figure for a table: three digits, "lost" for infinity, "-" for nothing."""
+    """A number for a table: three digits, "lost" for infinity, "-" for nothing."""
     if np.isnan(value):
         return "-"
     return "lost" if np.isinf(value) else f"{value:.3g}"

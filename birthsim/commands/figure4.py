@@ -59,7 +59,7 @@ def record_run(
     return record(env, 0, FIELDS, "Fig. 4", look)
 
 
-def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[str, Any]:
+def metrics_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[str, Any]:
     """Settled RMS error per axis and half (mm), pneumatic stiffness error (% RMS), clearance from the end stops (mm)."""
     error, stiffness = 1e3 * record["tracking_error"], record["stiffness_setpoint"][:, 0]
     settled = record["since_jump"] >= SETTLED
@@ -88,7 +88,7 @@ def main(settings: Settings) -> None:
 
     with whole_results(folder) as place:
         record = record_run(controller, settings.sensors, rig, place / "rig.png")
-        result = figures_of(record, rig)
+        result = metrics_of(record, rig)
         figure4(record, place)
         write_json(place / "figure4.json", result)
     if result["lost"]:

@@ -1,4 +1,4 @@
-"""Evaluations on a device: all episodes run there side by side, to the figures of ``baselines.bench.evaluation``."""
+"""Evaluations on a device: all episodes run there side by side, with the metrics of ``baselines.bench.evaluation``."""
 
 import copy
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from tqdm import tqdm
 from baselines.bench.evaluation import AT_ONCE, Evaluation, times_of
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
-from baselines.bench.metrics import figures_of
+from baselines.bench.metrics import metrics_of
 from baselines.controller import CommandFunction, Controller, controller_of
 from baselines.staged import driving
 from birthsim_build.device.lanes import Lanes
@@ -54,7 +54,7 @@ def evaluate_on(
         if missed:
             simulation.actuation.explain(simulation.measurement, simulation.reference)
     own, returns = measures.own, dict(zip(DISCOUNTS, measures.own.returns.tolist(), strict=True))
-    metrics = {metric: values.tolist() for metric, values in figures_of(own, simulation.period).items()}
+    metrics = {metric: values.tolist() for metric, values in metrics_of(own, simulation.period).items()}
     lost, success = (own.alive == 0.0).tolist(), (own.success > 0.0).tolist()
     traces = [measures.error.transpose(0, 2, 1)]
     cost = float(np.median(times_of(simulation.actuation, simulation)))

@@ -57,7 +57,7 @@ class Half:
         small.write(picture, "tracking error, mm", (plot.x, plot.y - 2), d.INK, (0, 1))
         for tick in self._ticks:
             small.write(picture, f"{1e3 * tick:g}", (plot.x - margin // 2, self._row(tick)), d.INK, (1, 0.5))
-        # Seconds stand apart, and none at either end, where the axes' own figures are.
+        # Seconds stand apart, and none at either end, where the axes' own numbers are.
         begin, end = self._span
         step = math.ceil(1.6 * small.width("10 s") * (end - begin) / plot.width)
         for second in range(math.floor(begin) + step, math.ceil(end), step):

@@ -1,4 +1,4 @@
-// What is written of a rig: means over a quarter of a second, so that every place that writes a figure has the same one.
+// What is written of a rig: means over a quarter of a second, so that every place that writes a number has the same one.
 
 const SPAN = 250; // ms
 const POINTS = ["force", "position", "target", "compliant"];

@@ -1,4 +1,4 @@
-// The page's pictures, plots and figures as one picture: canvases are copied, words and marks are written where they stand.
+// The page's pictures, plots and numbers as one picture: canvases are copied, words and marks are written where they stand.
 
 const LEFT_OUT = ".settings, .under, .hint, .banner, .scrubber, .unseen, .handle, script, style";
 const PAINTED = ".readouts, .physics";

@@ -73,7 +73,7 @@ export class Rigs {
     this.rms[1].push(time, second?.error_mm ?? NaN);
   }
 
-  /** Choose the rig that figures, physics and plots show. */
+  /** Choose the rig that numbers, physics and plots show. */
   choose(k) {
     this.chosen = k;
     this.choices[k].checked = true;

@@ -19,7 +19,7 @@ NOTHING = "nothing"
 """What a rig is compared with where no second one is beside it."""
 
 OPENS = "backstepping"
-"""The controller that a visitor of the page meets: the paper's law, whose error under a pull can be seen."""
+"""The controller that a visitor of the page meets: the paper's control law, whose error under a pull can be seen."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def sliders(rig: Parameters) -> dict[str, Slider]:
         "Kcly": Slider("Closed-loop stiffness along y", "Kcly", "N/m", 200.0, 8000.0, 2000.0, log=True),
         "Kpneu1": Slider("Pneumatic stiffness of cylinder 1", "K1", "N/m", 2000.0, 6000.0, 4600.0, log=True),
         "Kpneu2": Slider("Pneumatic stiffness of cylinder 2", "K2", "N/m", 1000.0, 3000.0, 2300.0, log=True),
-        "damping": Slider("Damping, times the law's own", "B", "1", 1.0, 2.0, 1.0),
+        "damping": Slider("Damping, times the controller's own", "B", "1", 1.0, 2.0, 1.0),
         "mass": Slider("Mass that moves; the controller believes the rig's", "m", "kg", min(1.5, mass), max(6.0, mass), mass),
         "friction": Slider("Friction, times the rig's; the controller believes 1", "Ff", "1", 0.0, 2.0, 1.0),
         "drag_stiffness": Slider("Spring between end effector and pointer", "Kdrag", "N/m", 100.0, 3000.0, 1000.0, log=True),

@@ -1,4 +1,4 @@
-"""What the page says of itself: its figures and plots, its choices, and where it comes from."""
+"""What the page says of itself: its numbers and plots, its choices, and where it comes from."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -56,7 +56,7 @@ def controller_choice(name: str) -> dict[str, str]:
     policy = name.removeprefix(f"{RESIDUAL}:")
     if policy != name:
         title = f"{RESIDUAL} ({' '.join(Path(policy).parts[-2:])})"
-        return {"name": name, "title": title, "about": f"A law and a trained policy that corrects it: {policy}."}
+        return {"name": name, "title": title, "about": f"A controller and a trained policy that corrects it: {policy}."}
     if name == LEARNING:
         return {"name": name, "title": "learning here", "about": "A network at the valves, which learns in this page."}
     about = {one.name: one.about for one in entries("controller")}

@@ -1,9 +1,9 @@
-"""The figures of the paper's Fig. 4, whose picture ``birthsim figure4`` draws."""
+"""The metrics of the paper's Fig. 4, whose picture ``birthsim figure4`` draws."""
 
 from typing import Any
 
 from baselines.work.tasks import Result, Task
-from birthsim.commands.figure4 import figures_of, record_run
+from birthsim.commands.figure4 import metrics_of, record_run
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.results import Content
 from lab.studies.study import Options, Study
@@ -11,8 +11,8 @@ from lab.studies.tables import markdown
 
 
 def measure(controller: str) -> Result:
-    """``figures_of`` the experiment with ideal sensors."""
-    return figures_of(record_run(controller), Parameters())
+    """``metrics_of`` the experiment with ideal sensors."""
+    return metrics_of(record_run(controller), Parameters())
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -20,7 +20,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "figure", "x or 1", "y or 2"]]
+    rows = [["controller", "metric", "x or 1", "y or 2"]]
     for controller, figures in content["figures"].items():
         for name, values in figures.items():
             if isinstance(values, list):

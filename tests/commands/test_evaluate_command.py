@@ -10,7 +10,7 @@ from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.files import finite
 from lab.studies.comparison import stiffness as studies
-from lab.studies.comparison.study import figures_of
+from lab.studies.comparison.study import cells_of
 from tests.console import OWN, assert_picture, call, interrupted, strict
 
 
@@ -83,7 +83,7 @@ def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     content = strict(out / "comparison.json")
     assert content["settings"]["controller"] == ["backstepping", slam]
     assert "out" not in content["settings"], "results do not depend on where they are"
-    cells = {(cell["controller"], cell["plant"]): cell for cell in figures_of(content)}
+    cells = {(cell["controller"], cell["plant"]): cell for cell in cells_of(content)}
     assert set(cells) == {(name, plant) for name in ("backstepping", slam) for plant in ("nominal", "randomised")}
     law, lost = cells["backstepping", "nominal"], cells[slam, "nominal"]
     assert (law["episodes"], law["lost"], lost["lost"]) == (2, 0, 2)
@@ -130,7 +130,7 @@ def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_pa
     assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
     assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()
-    assert [cell["controller"] for cell in figures_of(strict(tmp_path / "out" / "comparison.json"))] == ["backstepping"]
+    assert [cell["controller"] for cell in cells_of(strict(tmp_path / "out" / "comparison.json"))] == ["backstepping"]
 
 
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):

@@ -11,7 +11,7 @@ from baselines.bench.evaluation import Evaluation, overview
 from baselines.figures import runs as figures
 from baselines.figures.runs import error_over_time
 from birthsim.commands import figure4 as figure4_command
-from birthsim.commands.figure4 import FIELDS, figures_of, record_run
+from birthsim.commands.figure4 import FIELDS, metrics_of, record_run
 from birthsim_env import Parameters
 from tests.console import assert_picture, call, strict
 
@@ -85,7 +85,7 @@ def test_weight_compensation_lowers_the_error_on_x(records, setpoint, sensors):
 
 def test_the_figures_beside_the_plot_are_those_of_the_record(records):
     record = records["backstepping", "ideal"]
-    result = figures_of(record, RIG)
+    result = metrics_of(record, RIG)
     for setpoint in LIMITS:
         np.testing.assert_allclose(result[f"settled_rms_mm_at_{setpoint}"], settled_rms(record, setpoint))
         chosen = (record["since_jump"] >= 0.5) & (record["stiffness_setpoint"][:, 0] == setpoint)
@@ -96,7 +96,7 @@ def test_the_figures_beside_the_plot_are_those_of_the_record(records):
     np.testing.assert_allclose(result["least_clearance_mm"], 1e3 * ([0.1, 0.2] - np.abs(record["piston_position"]).max(axis=0)))
     assert (result["finite"], result["duration_s"]) == (True, pytest.approx(16))
     broken = {**record, "position": np.where(record["time"][:, None] > 15, np.nan, record["position"])}
-    assert figures_of(broken, RIG)["finite"] is False
+    assert metrics_of(broken, RIG)["finite"] is False
 
 
 def test_the_command_writes_its_figures_the_picture_and_the_numbers(command):
@@ -106,7 +106,7 @@ def test_the_command_writes_its_figures_the_picture_and_the_numbers(command):
     assert_picture(out, "figure4")
     assert (out / "rig.png").stat().st_size > 10_000
     numbers = strict(out / "figure4.json")
-    assert numbers == figures_of(record, RIG)
+    assert numbers == metrics_of(record, RIG)
     table = {words[0]: words[1:] for words in map(str.split, printed.splitlines()) if words}
     assert table["settled_rms_mm_at_2000"] == [f"{value:.3f}" for value in numbers["settled_rms_mm_at_2000"]]
 

@@ -3,7 +3,7 @@
 import gymnasium
 import numpy as np
 
-from agents.residual.privileged import FIGURES, acting, true_figures, with_figures
+from agents.residual.privileged import TRUE_PARAMETERS, acting, true_parameters, with_true_parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -17,13 +17,13 @@ def make(**arguments):
 
 
 def test_as_described_nothing_is_special():
-    figures = true_figures(make(sensors="lab"))
-    np.testing.assert_array_equal(figures, np.tile([1.0] * (FIGURES - 6) + [0.0] * 6, (LANES, 1)).astype(np.float32))
+    figures = true_parameters(make(sensors="lab"))
+    np.testing.assert_array_equal(figures, np.tile([1.0] * (TRUE_PARAMETERS - 6) + [0.0] * 6, (LANES, 1)).astype(np.float32))
 
 
 def test_every_figure_of_the_rig_that_is_drawn_is_told():
     nominal, ranges = Parameters(), documented_ranges(Parameters())
-    figures = true_figures(make(randomize="plant")).T[:-6]
+    figures = true_parameters(make(randomize="plant")).T[:-6]
     names = (
         "mechanics.mass", "cylinder1.coulomb_friction", "cylinder2.coulomb_friction", "cylinder1.viscous_friction",
         "cylinder2.viscous_friction", "valves.time_constant", "chambers.dead_volume", "chambers.wall_heat_transfer",
@@ -40,7 +40,7 @@ def test_the_errors_of_honest_sensors_are_told():
     rig = Parameters().replace({f"electronics.{name}": 0.0 for name in ("position_noise", "pressure_noise", "missed_periods")})
     rig = rig.replace({"electronics.adc_bits": 0.0})
     env = make(sensors="honest", parameters=rig)
-    figures, simulation = true_figures(env).T[-6:], env.simulation
+    figures, simulation = true_parameters(env).T[-6:], env.simulation
     seen = simulation.measurement
     # The first sample of an episode is not late. A single's 24 bits of numbers near 1.
     np.testing.assert_allclose(figures[4:], 1e3 * (seen.position - simulation.motion[:2]), atol=1e-6)
@@ -51,6 +51,6 @@ def test_the_errors_of_honest_sensors_are_told():
 def test_only_a_privileged_policy_is_told():
     env = make(randomize=True)
     seen = np.zeros((LANES, 4), np.float32)
-    for privileged, length in ((False, 4), (True, 4 + FIGURES)):
+    for privileged, length in ((False, 4), (True, 4 + TRUE_PARAMETERS)):
         assert acting(np.shape, env, privileged)(seen) == (LANES, length)
-    np.testing.assert_array_equal(with_figures(env, seen)[:, 4:], true_figures(env))
+    np.testing.assert_array_equal(with_true_parameters(env, seen)[:, 4:], true_parameters(env))

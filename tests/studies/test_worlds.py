@@ -123,7 +123,7 @@ def test_what_readme_and_paper_say_of_the_circle_holds():
     """They round; this fails when a renewed result leaves what the words mean."""
     found = {
         (cell["controller"], cell["sensors"], cell["plant"]): cell["metrics"]["settled_rms"]["median"]
-        for cell in comparison.figures_of(read_result("circle"))
+        for cell in comparison.cells_of(read_result("circle"))
     }
     lab = {name: error for (name, sensors, _), error in found.items() if sensors == "lab"}
     published, told, weighed = (lab[name] for name in ("backstepping", f"{TOLD}backstepping", f"{TOLD}backstepping-weight"))

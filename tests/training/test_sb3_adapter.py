@@ -11,7 +11,7 @@ from gymnasium import spaces
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
-from agents.residual.privileged import FIGURES, true_figures
+from agents.residual.privileged import TRUE_PARAMETERS, true_parameters
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.privileged import Privileged
 from agents.training.sb3.shifted_reward import ShiftedReward
@@ -165,14 +165,14 @@ def test_every_observation_has_the_figures_of_its_own_episode():
     seen, ends = env.reset(), 0
     assert seen.shape == (4, *env.observation_space.shape)
     for _ in range(12):
-        before = seen[:, -FIGURES:]
+        before = seen[:, -TRUE_PARAMETERS:]
         seen, _, ended, infos = env.step(np.zeros((4, 2), np.float32))
-        np.testing.assert_array_equal(seen[:, -FIGURES:], true_figures(lanes))
+        np.testing.assert_array_equal(seen[:, -TRUE_PARAMETERS:], true_parameters(lanes))
         assert not ended.all(), "they are staggered"
-        assert (seen[~ended, -FIGURES:] == before[~ended]).all()
+        assert (seen[~ended, -TRUE_PARAMETERS:] == before[~ended]).all()
         for lane in np.flatnonzero(ended):
-            np.testing.assert_array_equal(infos[lane]["terminal_observation"][-FIGURES:], before[lane])
-            assert (seen[lane, -FIGURES:] != before[lane]).any()
+            np.testing.assert_array_equal(infos[lane]["terminal_observation"][-TRUE_PARAMETERS:], before[lane])
+            assert (seen[lane, -TRUE_PARAMETERS:] != before[lane]).any()
             ends += 1
     assert ends >= 8
     env.close()

@@ -11,7 +11,7 @@ from scipy import stats
 
 from agents.policy.files import FORMAT, WEIGHTS, load_policy, policy_content, save_policy
 from agents.policy.sealed import sealed, unsealed
-from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_figures
+from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_metrics
 from agents.reports import inspection
 from agents.reports.card import compared
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
@@ -66,7 +66,7 @@ def test_the_crossed_interval_knows_that_seeds_are_a_sample_too():
 def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     law = evaluation("law", [2.0, 2.0, 2.0, 50.0], beyond=(3,))
     residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], beyond=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
-    text = as_table(seed_figures(law, residuals))
+    text = as_table(seed_metrics(law, residuals))
     assert "3 of 4 episodes are within the rig's strength; 2 training seeds" in text
     assert f"| pooled RMS of each seed | | 1, {np.sqrt((1 + 1 + 100**2) / 3):.3g} | |" in text
     assert "| lost | | episodes; 100 mm in a pooled RMS | 0 | 0, 1 | |" in text
@@ -78,7 +78,7 @@ def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
 
 def test_where_most_episodes_are_lost_the_table_says_so():
     law = evaluation("law", [1.0, 2.0, 3.0, 4.0])
-    text = as_table(seed_figures(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2))
+    text = as_table(seed_metrics(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2))
     assert "less, interquartile mean | | most episodes are lost |" in text
     assert "inf" not in text
 

@@ -56,18 +56,18 @@ class Monitor(BaseCallback):
         began, reached = time.perf_counter(), self.reached
         average: Any = self.model.average  # type: ignore[attr-defined]
         network = network_of(average.module, self.training_env)  # type: ignore[arg-type]
-        figures = reached.validate(network)
+        metrics = reached.validate(network)
         self._validating += time.perf_counter() - began
         seconds = self._before + time.perf_counter() - self._started
         stepped = self._stepped
         fraction = stepped.seconds / max(time.perf_counter() - self._started - self._validating, 1e-9)
         parts = split(stepped.env.simulation, stepped.seconds / stepped.steps) if stepped.steps else {}
         about = {"steps": self.num_timesteps, "seconds": seconds, "environment_fraction": fraction, "split": parts}
-        best = reached.add(network, figures, about)
-        for name, value in reached.events(figures).items():
+        best = reached.add(network, metrics, about)
+        for name, value in reached.events(metrics).items():
             self.logger.record(name, value)
         self.logger.dump(self.num_timesteps)
-        self._bar.set_postfix_str(reached.words(figures))
+        self._bar.set_postfix_str(reached.words(metrics))
         save_checkpoint(self._folder, self.model, self.training_env, reached.describe(), reached.past())  # type: ignore[arg-type]
         if best:
             reached.keep()

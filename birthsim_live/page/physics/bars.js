@@ -4,9 +4,9 @@ import * as pen from "../pen.js";
 
 export const ROW = 19; // px
 const LEFT = 54; // px for names
-const RIGHT = 62; // px for figures
+const RIGHT = 62; // px for numbers
 
-/** Draws a row: its name, a bar for `share` from -1 to 1, and a figure. */
+/** Draws a row: its name, a bar for `share` from -1 to 1, and a number. */
 export function drawBar(context, width, row, name, share, figure, colour) {
   const [left, room, top] = [LEFT, width - LEFT - RIGHT, row * ROW];
   const middle = left + room / 2;

@@ -81,7 +81,7 @@ function picture(parent, name) {
   return new Sheet(canvas);
 }
 
-/** The figures of the port; returns the elements of their digits. */
+/** The numbers of the port; returns the elements of their digits. */
 function figures(parent) {
   const figure = document.createElement("figure");
   const caption = document.createElement("figcaption");

@@ -113,7 +113,7 @@ def _digits(value: float) -> float | None:
     return None if math.isnan(value) else float(f"{value:.6g}")
 
 
-def figures_of(content: Content) -> list[dict[str, Any]]:
+def cells_of(content: Content) -> list[dict[str, Any]]:
     """The cells, as ``statistics`` had them, from a result."""
     cells: dict[tuple[Any, ...], dict[str, Any]] = {}
     for row in content["figures"]["rows"]:
@@ -130,13 +130,14 @@ def _number(value: float | None) -> float:
 
 
 def tables(content: Content, name: str) -> dict[str, str]:
-    """The overview, the losses where there are several environments, and every figure as CSV."""
-    figures, settings = figures_of(content), content["settings"]
+    """The overview, the losses where there are several environments, and every metric as CSV."""
+    figures, settings = cells_of(content), content["settings"]
     several = len({cell["environment"] for cell in figures}) > 1
     parts = [
         f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad.",
         overview(figures), *([losses(figures)] if several else []),
-        f"Every figure, with its interval, its worst episode and its ratio to the paper's law: [{name}.csv](data/{name}.csv)",
+        "Every metric, with its interval, its worst episode and its ratio to that of the paper's controller: "
+        f"[{name}.csv](data/{name}.csv)",
     ]  # fmt: skip
     return {f"{name}.md": "\n\n".join(parts) + "\n", f"{name}.csv": data(figures)}
 
@@ -148,7 +149,7 @@ def measured_on(settings: dict[str, Any]) -> str:
 
 def _cuts(content: Content) -> dict[str, str]:
     """The master table, and what the page on moving hands takes of it."""
-    figures = figures_of(content)
+    figures = cells_of(content)
     where = {(CIRCLE, "randomised", sensors) for sensors in COMPARED}
     moving = [cell for cell in figures if (cell["environment"], cell["plant"], cell["sensors"]) in where]
     return tables(content, "comparison") | (
@@ -157,7 +158,7 @@ def _cuts(content: Content) -> dict[str, str]:
 
 
 def _table_of(text: Callable[[Figures], str], name: str, content: Content) -> dict[str, str]:
-    return {f"{name}.md": f"{measured_on(content['settings'])}\n\n{text(figures_of(content))}\n"}
+    return {f"{name}.md": f"{measured_on(content['settings'])}\n\n{text(cells_of(content))}\n"}
 
 
 def _headline(content: Content) -> dict[str, str]:
@@ -167,7 +168,7 @@ def _headline(content: Content) -> dict[str, str]:
         "infinitely bad. *Rig*: the controller believes the default one, or is told each. *Mass learned*: where it is less "
         "than believed. Policies: five training seeds, with the sensors of their training."
     )
-    return {"circle.md": f"{said}\n\n{headline(figures_of(content))}\n"}
+    return {"circle.md": f"{said}\n\n{headline(cells_of(content))}\n"}
 
 
 def pictures(content: Content, folder: Path) -> list[Path]:
@@ -175,7 +176,7 @@ def pictures(content: Content, folder: Path) -> list[Path]:
     # pyplot takes half a second to load.
     from lab.studies.comparison.figure import draw_comparison
 
-    figures = figures_of(content)
+    figures = cells_of(content)
     return draw_comparison([cell for cell in figures if cell["sensors"] in COMPARED] or figures, folder)
 
 

@@ -49,7 +49,7 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["", "lanes", "median error", "within 1e-6 of one difference", "of one of three", "largest error", "bits equal"]]
+    rows = [["", "lanes", "median error", "within 1e-6 of one difference", "of one of three", "largest error", "bit-identical"]]
     for name, one in content["figures"].items():
         shares = (f"{100 * one[share]:.1f} %" for share in ("middle", "any"))
         ends = f"{one['worst']:.0e}", "yes" if one["equal"] else "NO"

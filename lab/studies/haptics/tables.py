@@ -27,7 +27,7 @@ def heading(runs: Runs) -> str:
     first = runs[0]
     randomised = f"{first['rigs']} randomised rigs, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
     rigs = randomised if first["rigs"] else "the rig as the controllers believe it"
-    return f"{rigs[0].upper()}{rigs[1:]}. Two figures in a cell are the median and the worst over poses, directions and rigs."
+    return f"{rigs[0].upper()}{rigs[1:]}. Two numbers in a cell are the median and the worst over poses, directions and rigs."
 
 
 def rendering_table(runs: Runs) -> str:

@@ -30,7 +30,7 @@ def drawn_places(seeds: Seeds, ranges: Ranges) -> Array:
     return np.array([[streams.random() for _ in ranges] for streams in (stream(int(s), 0, "parameters") for s in seeds)]).T
 
 
-def figures_at(places: Array, ranges: Ranges) -> dict[str, Array]:
+def parameters_at(places: Array, ranges: Ranges) -> dict[str, Array]:
     """The figures, SI units, at ``places`` (F, ...) of their ranges."""
     sides = ((name, *ranges[name]) for name in sorted(ranges))
     return {name: low + (high - low) * place for (name, low, high), place in zip(sides, places, strict=True)}
@@ -38,7 +38,7 @@ def figures_at(places: Array, ranges: Ranges) -> dict[str, Array]:
 
 def rigs_at(places: Array, ranges: Ranges, rig: Parameters) -> Array:
     """The rows of rigs (PARAMETERS, N) whose figures stand at ``places`` (F, N)."""
-    values = iter(figures_at(places, ranges).values())
+    values = iter(parameters_at(places, ranges).values())
 
     class Placed:
         uniform = staticmethod(lambda low, high: next(values))

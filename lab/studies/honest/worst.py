@@ -22,7 +22,7 @@ from birthsim_env.physics.rig.parameters import DECLARED, Parameters, load_param
 from birthsim_env.physics.rig.values import checked_number
 from birthsim_env.registry import names
 from lab.studies.comparison.grid import as_described
-from lab.studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
+from lab.studies.honest.search import Seeds, drawn_places, hardest, parameters_at, rigs_at
 from lab.studies.results import Content
 from lab.studies.study import Options, Study
 from lab.studies.tables import markdown
@@ -65,7 +65,7 @@ def worst(
     order = np.argsort(-sizes, kind="stable")
     begun = seeds, places, _bearable(done, metric)
     found, where = hardest(lambda *world: _bearable(run(*world), metric), *begun, episodes, seed)
-    figures = {name: float(value) for name, value in figures_at(where, ranges).items()}
+    figures = {name: float(value) for name, value in parameters_at(where, ranges).items()}
     return {
         "controller": controller, "sensors": sensors,
         **{name: jsonable([quantile(sizes_of(done, name), part) for part in (0.5, 0.95, 1.0)]) for name in (metric, "unrest")},
@@ -118,7 +118,7 @@ def _shown(content: Content) -> dict[str, str]:
     rows = [[*head, named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
     names = list(content["figures"][0]["found"]["figures"])
     worlds = [[*head, "found in world", "push, N", "mm asked for", "% of the strength", *names]]
-    changed = [[*head, "figure", "of the world found", "put to", named]]
+    changed = [[*head, "parameter", "of the world found", "put to", named]]
     for row in content["figures"]:
         own, found = [row["controller"], row["sensors"]], row["found"]
         sizes = [", ".join(map(_number, row[name])) for name in (metric, "unrest")]

@@ -34,7 +34,7 @@ def measure(controller: str, source: str, rig: dict[str, Any], sensors: str, **o
     return {name: jsonable(felt[name].tolist()) for name in COLUMNS}
 
 
-def figures_of(results: list[Result]) -> dict[str, list[float]]:
+def metrics_of(results: list[Result]) -> dict[str, list[float]]:
     """Median, 95th percentile and worst of each of ``COLUMNS`` over rigs, and over training seeds where there are several."""
     every = {name: [float("inf") if value == "lost" else value for one in results for value in one[name]] for name in COLUMNS}
     return {name: [quantile(values, part) for part in (0.5, 0.95, 1.0)] for name, values in every.items()}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from agents.policy.files import WEIGHTS
 from agents.policy.pieces import evaluate_learned
-from agents.policy.seeds import as_table, policy_folders, seed_figures
+from agents.policy.seeds import as_table, policy_folders, seed_metrics
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
 from baselines.bench.statistics import jsonable
@@ -106,8 +106,8 @@ def _kept(options: Options, found: Found) -> Any:
         together = [*controllers, merged(seeds, f"residual, {len(seeds)} seeds")]
         felt_of = [[pieces[one.controller][-1]] for one in controllers] + [[pieces[one.controller][-1] for one in seeds]]
         kept[policy] = {
-            "beside": {one.controller: seed_figures(one, seeds) for one in controllers},
-            "felt": {one.controller: felt.figures_of(own) for one, own in zip(together, felt_of, strict=True)},
+            "beside": {one.controller: seed_metrics(one, seeds) for one in controllers},
+            "felt": {one.controller: felt.metrics_of(own) for one, own in zip(together, felt_of, strict=True)},
             "metrics": {"columns": list(DATA), "rows": list(csv.reader(io.StringIO(data(together))))[1:]},
         }
     return jsonable(kept)
@@ -128,7 +128,8 @@ def _shown(content: Content) -> dict[str, str]:
 
 def _summary(figures: dict[str, Any]) -> str:
     """Pooled errors of each scenario's policy beside its controllers."""
-    head = ["scenario", "paper's law, mm", "controller underneath, mm", "with the residual, mm", "less than the paper's law, %"]
+    paper = "paper's controller"
+    head = ["scenario", f"{paper}, mm", "controller underneath, mm", "with the residual, mm", f"less than the {paper}, %"]
     lines = [head, ["---"] * len(head)]
     shown = [policy for policy in ("circle", "probe", "forceps", "dystocia", "descent") if policy in figures]
     for policy in shown:

@@ -164,7 +164,7 @@ def _shown(content: Content) -> dict[str, str]:
     ]
     for target, found in figures.items():
         laws = found["report"].get("estimate") or {}
-        rows = [["what", "bits", "estimate per period" if laws else "speed"]]
+        rows = [["what", "bits compared with Python", "estimate per period" if laws else "speed"]]
         untimed = "a thread's code, run here" if target == "ptx" else "emulated"
         rows += [
             [label, bits, _cycles(laws, label) if laws else untimed if speed is None else f"{speed:,.0f}/s"]
