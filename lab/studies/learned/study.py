@@ -129,7 +129,8 @@ def _shown(content: Content) -> dict[str, str]:
 def _summary(figures: dict[str, Any]) -> str:
     """Pooled errors of each scenario's policy beside its controllers."""
     published = "paper's controller"
-    head = ["scenario", f"{published}, mm", "controller underneath, mm", "with the residual, mm", f"less than the {published}, %"]
+    with_residual = "controller underneath, mm", "with the residual, mm"
+    head = ["scenario", f"{published}, mm", *with_residual, f"less than the {published}, %"]
     lines = [head, ["---"] * len(head)]
     shown = [policy for policy in ("circle", "probe", "forceps", "dystocia", "descent") if policy in figures]
     for policy in shown:
