@@ -26,7 +26,7 @@ _TRAINED_ON = {"settings": {"sensors": str, "randomize": (bool, str), "rig": dic
 EPISODES, SEED = 64, 75_900_000
 """Of the comparison; no training, validation or design had these worlds."""
 
-FIGURES = {
+METRICS = {
     "settled_rms median": ("settled error, median", "mm"),
     "settled_rms q95": ("settled error, 95th percentile", "mm"),
     "stiffness_error median": ("stiffness error, median", "%"),
@@ -67,18 +67,18 @@ def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> st
     policy = load_policy(folder)
     about = settings_of(folder)
     whom, columns = [one.controller for one in evaluations], [metrics(one) for one in evaluations]
-    rows = {key: [column[key] for column in columns] for key in FIGURES if np.isfinite(columns[0][key])}
+    rows = {key: [column[key] for column in columns] for key in METRICS if np.isfinite(columns[0][key])}
     result = {
         "task": {"type": "reinforcement-learning", "name": "stiffness control"},
         "dataset": {"type": "gymnasium", "name": policy.environment},
-        "metrics": [{"type": key, "name": FIGURES[key][0], "value": row[0]} for key, row in rows.items()],
+        "metrics": [{"type": key, "name": METRICS[key][0], "value": row[0]} for key, row in rows.items()],
     }
     force = [policy.settings.force_sensor, *(uses_force(who) for who in whom[1:])]
     table = [
         f"| | {' | '.join(whom)} |",
         "|---|" + "---|" * len(whom),
         f"| uses the hand's force | {' | '.join('yes' if one else 'no' for one in force)} |",
-        *(f"| {', '.join(FIGURES[key])} | {' | '.join(map(_number, row))} |" for key, row in rows.items()),
+        *(f"| {', '.join(METRICS[key])} | {' | '.join(map(_number, row))} |" for key, row in rows.items()),
     ]
     law, network = policy.settings.law, policy.network
     made = about.get("algorithm") or "imitation of teachers"
@@ -126,7 +126,7 @@ def metrics(evaluation: Evaluation) -> dict[str, float]:
     """The metrics of a card over the episodes that the rig's strength suffices for; a lost one is infinitely bad."""
     feasible = np.asarray(evaluation.required_strength_ratio) < 1.0
     found = {"lost": 100 * float(np.mean(np.asarray(evaluation.lost)[feasible]))}
-    for metric, statistic in (key.split() for key in FIGURES if key != "lost"):
+    for metric, statistic in (key.split() for key in METRICS if key != "lost"):
         sizes = np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost))[feasible]
         found[f"{metric} {statistic}"] = quantile(sizes, 0.95 if statistic == "q95" else 0.5)
     return found
@@ -134,8 +134,8 @@ def metrics(evaluation: Evaluation) -> dict[str, float]:
 
 def _said(who: str, rows: dict[str, list[float]], column: int) -> str:
     """In which metrics the policy is better and worse than the one of a column."""
-    better = "; ".join(FIGURES[key][0] for key, row in rows.items() if row[0] < row[column])
-    worse = "; ".join(FIGURES[key][0] for key, row in rows.items() if row[0] > row[column])
+    better = "; ".join(METRICS[key][0] for key, row in rows.items() if row[0] < row[column])
+    worse = "; ".join(METRICS[key][0] for key, row in rows.items() if row[0] > row[column])
     return f"Beside `{who}` it is better in: {better or 'nothing'}. It is worse in: {worse or 'nothing'}."
 
 

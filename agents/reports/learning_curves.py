@@ -13,16 +13,16 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Listed
 
-FIGURES = (
+METRICS = (
     ("pooled_mm", "settled error (mm)"),
     ("tail_mm", "95th percentile (mm)"),
     ("stiffness_error_percent", "stiffness error (%)"),
     ("hunting_mm", "hunting (mm)"),
     ("saturation_percent", "valves saturated (%)"),
 )
-"""Figures of a validation, where they say something."""
+"""Metrics of a validation, where they say something."""
 
-_VALIDATION = {name: (float, None) for name, _ in FIGURES}
+_VALIDATION = {name: (float, None) for name, _ in METRICS}
 _TRAINING = {
     "settings": {"environment": str},
     "law": _VALIDATION,
@@ -61,7 +61,7 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
     """Draw ``learning_curves`` (PNG and SVG) with the law as a line; nothing without trainings."""
     if not trainings:
         return []
-    curves = [(key, label, *over_seeds(trainings, key)) for key, label in FIGURES]
+    curves = [(key, label, *over_seeds(trainings, key)) for key, label in METRICS]
     said = [curve for curve in curves if np.isfinite(curve[-1]).any()]
     with plt.rc_context(STYLE):
         rows = -(-len(said) // 2)
@@ -104,7 +104,7 @@ def draw_side_by_side(trainings: Mapping[str, Sequence[dict[str, Any]]], folder:
                     finals.setdefault(algorithm, []).append(error[-1])
             axes.set(yscale="log", xlim=0, xlabel=label)
         log_ticks(panels[0].yaxis, 1.0, 3.0)
-        panels[0].set_ylabel(dict(FIGURES)["pooled_mm"])
+        panels[0].set_ylabel(dict(METRICS)["pooled_mm"])
         reached = ", ".join(f"{algorithm} {np.median(errors):.2g} mm" for algorithm, errors in finals.items())
         headline(figure, f"Settled error reached: {reached}")
         legend_below(figure, said="a line for every training seed")

@@ -27,8 +27,10 @@ TRUE_PARAMETERS = len(DRAWN) + 6
 
 
 def true_parameters(env: Any) -> NDArray[np.float32]:
-    """Of the lanes of a vector environment now, (N, FIGURES): the parameters ``DRAWN`` over those that the owner describes; the
-    biases of the four pressure cells; and by how much scale and distortion move the place that the tracker shows, x and y.
+    """Of the lanes of a vector environment now, (N, TRUE_PARAMETERS).
+
+    They are the parameters ``DRAWN`` over those that the owner describes; the biases of the four pressure cells; and by how
+    much scale and distortion move the place that the tracker shows, x and y.
 
     Without ``honest`` sensors the last six are zero.
     """
@@ -42,7 +44,7 @@ def true_parameters(env: Any) -> NDArray[np.float32]:
 
 
 def with_true_parameters(env: Any, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Observations (N, D) of a vector environment with its ``true_parameters``, (N, D + FIGURES)."""
+    """Observations (N, D) of a vector environment with its ``true_parameters``, (N, D + TRUE_PARAMETERS)."""
     return np.concatenate([observations, true_parameters(env)], axis=1)
 
 

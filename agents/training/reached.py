@@ -17,7 +17,7 @@ from agents.training.validation import joined, merit, validate
 from birthsim_env.physics.rig.parameters import Parameters
 
 LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
-"""Figures of a validation that TensorBoard shows."""
+"""Metrics of a validation that TensorBoard shows."""
 
 
 class Reached:
@@ -69,12 +69,12 @@ class Reached:
         return bool(best["pooled_mm"] <= (1 - self._settings.until / 100) * paper["pooled_mm"])
 
     def validate(self, network: PolicyNetwork) -> dict[str, float]:
-        """Figures of a policy."""
+        """Metrics of a policy."""
         privileged = self._settings.privileged
         return self._metrics([(env, acting(network.acting(), env, privileged)) for env in self.envs])
 
     def _without_policy(self, envs: Sequence[Any]) -> dict[str, float]:
-        """Figures of the law alone: actions of zero."""
+        """Metrics of the controller alone: actions of zero."""
 
         def zero(env: Any) -> PolicyFunction:
             return lambda seen: np.zeros((len(seen), *env.single_action_space.shape), dtype=np.float32)

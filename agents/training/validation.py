@@ -33,7 +33,7 @@ Lanes = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Score:
-    """Figures per lane, (N,); NaN where an episode says nothing.
+    """Metrics per lane, (N,); NaN where an episode says nothing.
 
     - ``error``: settled RMS of sqrt(ex^2 + ey^2), mm, or RMS of the distance from the declared motion;
     - ``stiffness``: error of the rendered stiffness, %, the mean settled error along the push over the displacement asked for;
@@ -109,7 +109,7 @@ def validate(
 ) -> Score:
     """Run one episode in every lane of a residual vector environment under ``act``: observations (N, D) -> actions (N, size).
 
-    ``act`` stands at the beginning of an episode. Figures are sampled once per policy step. Where the ``target`` is the
+    ``act`` stands at the beginning of an episode. Metrics are sampled once per policy step. Where the ``target`` is the
     declared motion, ``Score.error`` is the distance from it, from ``SETTLED`` s after the beginning on.
     """
     observation, info = env.reset(seed=seed)

@@ -16,7 +16,7 @@ from ``FULL`` times that speed on. A rig whose force was balanced by a hand that
 chambers hold accelerates it until the valves have let it out, with any law. What the brake shortens is how far it flies.
 
 The tank needs a force sensor. Energy tanks: Ferraguti, Secchi and Fantuzzi, ICRA 2013; the observer: Hannaford and Ryu,
-IEEE Transactions on Robotics and Automation 18(1), 2002. Figures without a source are assumed.
+IEEE Transactions on Robotics and Automation 18(1), 2002. Numbers without a source are assumed.
 """
 
 import math

@@ -9,7 +9,7 @@ from baselines import make_controller
 from birthsim_env import FixedTarget, ForceProfile, Parameters, StiffnessSchedule
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest import HonestSensors
-from birthsim_env.parts.sensors.sensor_errors import FIGURES
+from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
 from lab.studies.haptics.worlds import no_hand, resting
 from lab.studies.stability.rig_port import RigPort
 from tests.env.test_loop import OwnValves, assert_same, course, own
@@ -107,14 +107,14 @@ def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
         env.reset(seed=5)
     rigs = [env.unwrapped.simulation.plant.lane_parameters for env in envs.values()]
     assert_same(rigs[1:], rigs[:1] * 2)
-    drawn = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)].copy()
+    drawn = envs["honest"].unwrapped.simulation.sensors._errors[: len(SENSOR_PARAMETERS)].copy()
     ranges = documented_ranges(Parameters(), "honest")
-    assert {f"electronics.{name}" for name in FIGURES} - set(ranges) == {"electronics.clock_jitter"}, "an option"
-    for row, name in zip(drawn, FIGURES[:-1], strict=False):
+    assert {f"electronics.{name}" for name in SENSOR_PARAMETERS} - set(ranges) == {"electronics.clock_jitter"}, "an option"
+    for row, name in zip(drawn, SENSOR_PARAMETERS[:-1], strict=False):
         low, high = ranges[f"electronics.{name}"]
         assert low <= row.min() < low + 0.2 * (high - low) < high - 0.2 * (high - low) < row.max() <= high, name
     envs["honest"].reset(seed=6)
-    again = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)]
+    again = envs["honest"].unwrapped.simulation.sensors._errors[: len(SENSOR_PARAMETERS)]
     np.testing.assert_array_equal(again[:, :-1], drawn[:, 1:])
 
 

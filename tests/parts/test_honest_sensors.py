@@ -11,12 +11,12 @@ from birthsim_env import Parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.sensors.honest import HonestSensors
 from birthsim_env.parts.sensors.lab import LabSensors
-from birthsim_env.parts.sensors.sensor_errors import FIGURES
+from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
 from birthsim_env.physics.electronics import Electronics
 from tests.console import ROOT
 
 LAB = ("position_noise", "position_latency", "pressure_noise")
-OFF = {name: 0.0 for name in FIGURES if name not in (*LAB, "distortion_length")}
+OFF = {name: 0.0 for name in SENSOR_PARAMETERS if name not in (*LAB, "distortion_length")}
 """``lab``'s figures, and no other error."""
 EXACT = {**OFF, **dict.fromkeys(LAB, 0.0), "position_rate": 1000.0}
 """No error at all, and a sample every period."""

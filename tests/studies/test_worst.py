@@ -60,7 +60,7 @@ def test_a_world_is_told_as_the_environment_draws_it():
     env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=1, randomize=True, sensors="honest", policy_period=0.5)
     env.reset(seed=[SEED])
     mass = env.simulation.plant.lane_parameters[8, 0]
-    noise = env.simulation.sensors.figures["position_noise"][0]
+    noise = env.simulation.sensors.parameters["position_noise"][0]
     for _ in range(9):
         info = env.step(np.zeros((1, 4), dtype=np.float32))[4]
         info = info.get("final_info", info)

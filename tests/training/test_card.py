@@ -6,7 +6,7 @@ import yaml
 from agents.policy.files import load_policy
 from agents.policy.seeds import best_policy
 from agents.policy.shipped import SHIPPED
-from agents.reports.card import FIGURES, TRAINING, compared, model_card
+from agents.reports.card import METRICS, TRAINING, compared, model_card
 from baselines.bench.evaluation import Evaluation
 from birthsim_env.registry import names
 from tests.console import call
@@ -29,7 +29,7 @@ def test_the_hub_reads_what_was_measured_and_readers_where_it_is_worse(name):
     metrics = {one["type"]: one["value"] for one in index["results"][0]["metrics"]}
     # The third episode asks for more than the rig has; nothing was felt in any.
     assert (metrics["settled_rms median"], metrics["air median"]) == (pytest.approx(0.3), 30.0)
-    assert set(metrics) == set(FIGURES) - {"stiffness_error median"}
+    assert set(metrics) == set(METRICS) - {"stiffness_error median"}
     assert "| settled error, median, mm | 0.3 | 0.6 |" in card
     assert "is worse in: air, median." in card
     assert (

@@ -12,7 +12,7 @@ import pytest
 
 from agents.policy.controller import ResidualController
 from agents.policy.files import WEIGHTS, load_policy
-from agents.residual.privileged import FIGURES
+from agents.residual.privileged import TRUE_PARAMETERS
 from agents.residual.settings import ResidualSettings
 from agents.training import reached as reached_module
 from agents.training import trainer as training
@@ -230,6 +230,6 @@ def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
     policy = load_policy(tmp_path)
     assert policy.training["privileged"] is True
     with pytest.raises(
-        ValueError, match=rf"maps {policy.network.inputs} to 2 numbers; allowed: {policy.network.inputs - FIGURES}"
+        ValueError, match=rf"maps {policy.network.inputs} to 2 numbers; allowed: {policy.network.inputs - TRUE_PARAMETERS}"
     ):
         ResidualController(policy=tmp_path)

@@ -1,6 +1,6 @@
 """What a control board reads of a force sensor, a tracker, pressure cells and an accelerometer, each with its errors.
 
-The sensor models ``lab`` and ``honest`` are such boards. Figures, their basis and the ranges that are drawn from are fields of
+The sensor models ``lab`` and ``honest`` are such boards. Parameters, their basis and their ranges are fields of
 ``physics.electronics``.
 """
 
@@ -18,7 +18,16 @@ from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.parts.sensors.noise import happens, noise_of
-from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Figures, Shared, Unit, field, shared, work_out
+from birthsim_env.parts.sensors.sensor_errors import (
+    SENSOR_PARAMETERS,
+    Errors,
+    SensorParameters,
+    Shared,
+    Unit,
+    field,
+    shared,
+    work_out,
+)
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel, over
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
@@ -59,7 +68,7 @@ def _sample(e: Errors, shared: Shared, i: int, axis: int, x: float, y: float, no
 @helper
 def _growth(e: Errors, shared: Shared, i: int, x: float, y: float) -> float:
     """Factor by which the tracker's noise at (``x``, ``y``) is larger than where it was registered."""
-    place, origin, power = shared.registration, shared.transmitter, e.figures.position_noise_growth[i]
+    place, origin, power = shared.registration, shared.transmitter, e.parameters.position_noise_growth[i]
     dx, dy, ax, ay = x - origin[0], y - origin[1], place[0] - origin[0], place[1] - origin[1]
     nearer = (dx * dx + dy * dy) / (ax * ax + ay * ay)
     return exact.exp(0.5 * power * exact.log(max(nearer, 1e-12))) if power > 0.0 else 1.0
@@ -72,16 +81,16 @@ def _track(
     """Take a sample where it is due, and let arrive what is under way in the ``queue`` (Q, 3, N)."""
     tick = int(world.tick[i])
     due = tracker.sample_due(tick, time, shared.period, shared.rate)
-    if due and (tick == 0 or not happens(key, tick, LOST, e.figures.position_dropout[i])):
+    if due and (tick == 0 or not happens(key, tick, LOST, e.parameters.position_dropout[i])):
         x, y = world.motion.position[0, i], world.motion.position[1, i]
-        noise = e.figures.position_noise[i] * _growth(e, shared, i, x, y)
+        noise = e.parameters.position_noise[i] * _growth(e, shared, i, x, y)
         at_x = _sample(e, shared, i, 0, x, y, noise_of(key, tick, TRACKED, noise))
         at_y = _sample(e, shared, i, 1, x, y, noise_of(key, tick, TRACKED + 1, noise))
         tracker.take(queue, i, time, shared.rate, at_x, at_y)
         if tick == 0:
             speed = world.motion.velocity
             tracker.start(queue, arrived, i, at_x, at_y, speed[0, i], speed[1, i])
-    tracker.arrive(queue, arrived, i, time, e.figures.position_latency[i])
+    tracker.arrive(queue, arrived, i, time, e.parameters.position_latency[i])
 
 
 @kernel
@@ -101,14 +110,14 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
         # Where other lanes begin anew, all are looked at once more in the same period.
         again = tick > 0 and own.tick[i] == tick
         own.tick[i] = tick
-        read = tick == 0 or not happens(key, tick, MISSED, e.figures.missed_periods[i])
+        read = tick == 0 or not happens(key, tick, MISSED, e.parameters.missed_periods[i])
         for axis in range(2):
             force = world.force[axis, i]
             sensed = force + (e.gain[axis, i] * force + e.crosstalk[axis, i] * world.force[1 - axis, i]) + e.bias[axis, i]
             share = 1.0 if tick == 0 else e.passed[i]
             if not again:
                 passed[axis, i] = passed[axis, i] + share * (sensed - passed[axis, i]) if share < 1.0 else sensed
-            value = passed[axis, i] + noise_of(key, tick, NOISE_OF_FORCE + axis, e.figures.force_noise[i])
+            value = passed[axis, i] + noise_of(key, tick, NOISE_OF_FORCE + axis, e.parameters.force_noise[i])
             value = converted(value, e.force_step[i], -shared.force_range, shared.force_range)
             for k in range(slots if tick == 0 else 1):
                 late[(tick + k) % slots, axis, i] = value
@@ -127,12 +136,12 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
                     noise = noise_of(key, tick, acceleration.NOISE + axis, shared.acceleration_noise)
                     readings.acceleration[axis, i] = own.low_passed[axis, i] + noise
         if read:
-            stamp = arrived.time[i] + (e.figures.position_latency[i] - shared.stamped)
+            stamp = arrived.time[i] + (e.parameters.position_latency[i] - shared.stamped)
             readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
             for axis in range(2):
                 readings.position[axis, i], readings.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
             for chamber in range(4):
-                noise = noise_of(key, tick, chamber, e.figures.pressure_noise[i])
+                noise = noise_of(key, tick, chamber, e.parameters.pressure_noise[i])
                 value = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
                 readings.pressure[chamber, i] = converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
         seen.position_time[i] = readings.position_time[i]
@@ -186,13 +195,13 @@ class BoardSensors(SensorModel):
         lanes: NDArray[Any] = np.atleast_1d(lane)
         self._keys[lane] = rng.integers(2**64, dtype=np.uint64)
         unit = np.asanyarray(rng.uniform(-1.0, 1.0, Unit.size)).reshape(Unit.size, -1)
-        figures = Figures(np.empty_like(unit, shape=(Figures.size, len(lanes))))
-        for name in FIGURES:
-            getattr(figures, name)[:] = getattr(self._electronics, name)
+        parameters = SensorParameters(np.empty_like(unit, shape=(SensorParameters.size, len(lanes))))
+        for name in SENSOR_PARAMETERS:
+            getattr(parameters, name)[:] = getattr(self._electronics, name)
         for name, (low, high) in self._ranges.items():
-            getattr(figures, name)[:] = rng.uniform(low, high)
+            getattr(parameters, name)[:] = rng.uniform(low, high)
         errors = Errors(np.empty_like(unit, shape=(Errors.size, len(lanes))))
-        over(work_out, figures, Unit(unit), Shared(self._shared), errors)
+        over(work_out, parameters, Unit(unit), Shared(self._shared), errors)
         # Drawn last, so that all else is drawn as on a rig without such a sensor.
         most = np.repeat([self._electronics.acceleration_bias, self._electronics.acceleration_gain_error], 2)
         drawn = most[:, None] * np.asanyarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)

@@ -13,7 +13,7 @@ from birthsim_env.loop.rows import OPENING, TICK, Seen, World
 from birthsim_env.loop.stage import Stage, table1, table2
 from birthsim_env.parts.sensors.board import MISSED, BoardSensors, converted
 from birthsim_env.parts.sensors.noise import happens, uniform
-from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Shared, shift
+from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS, Errors, Shared, shift
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.electronics import Electronics
@@ -33,8 +33,8 @@ def _put_out(world: World, seen: Seen, memory: int, constants: int, tables: int,
     mine = slice(lane, lane + n)
     keys, e, last = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table2(tables, 2)[:, mine]
     for i in range(n):
-        tick, jitter = int(world.tick[i]), e.figures.clock_jitter[i]
-        missed = tick > 0 and happens(keys[i], tick, MISSED, e.figures.missed_periods[i])
+        tick, jitter = int(world.tick[i]), e.parameters.clock_jitter[i]
+        missed = tick > 0 and happens(keys[i], tick, MISSED, e.parameters.missed_periods[i])
         late = jitter * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if tick > 0 and jitter > 0.0 else 0.0
         for valve in range(4):
             value = converted(seen.opening[valve, i], e.opening_step[i], -1.0, 1.0)
@@ -49,7 +49,7 @@ class HonestSensors(BoardSensors):
     """``BoardSensors`` with all of their errors, whose figures episodes may draw. The valves are commanded through a converter,
     and stay as they were in a missed period (``board_stage``)."""
 
-    drawn = tuple(f"electronics.{name}" for name in FIGURES)
+    drawn = tuple(f"electronics.{name}" for name in SENSOR_PARAMETERS)
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         super().__init__(electronics, num_envs)
@@ -60,9 +60,9 @@ class HonestSensors(BoardSensors):
         self._make_room()
 
     @property
-    def figures(self) -> dict[str, Array]:
+    def parameters(self) -> dict[str, Array]:
         """Figure -> what the episode of each lane has, (N,)."""
-        return dict(zip(FIGURES, Errors(self._errors).figures.rows, strict=True))
+        return dict(zip(SENSOR_PARAMETERS, Errors(self._errors).parameters.rows, strict=True))
 
     @property
     def errors(self) -> Array:

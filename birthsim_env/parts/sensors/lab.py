@@ -8,7 +8,7 @@ from birthsim_env.physics.electronics import Electronics
 from birthsim_env.registry import register
 
 ACCELEROMETER = ("acceleration_bandwidth", "acceleration_noise")
-"""Figures besides those of tracker and pressure cells that ``lab`` has too."""
+"""Parameters besides those of tracker and pressure cells that ``lab`` has too."""
 
 
 @register(sensors="lab", about="A tracker that samples, is late and noisy, and noisy pressure cells.", order=2)

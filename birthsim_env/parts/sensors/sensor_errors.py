@@ -17,11 +17,11 @@ from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, r
 from birthsim_env.physics.electronics import Electronics
 
 _DRAWN = {name: one for name, one in Electronics.parameters.items() if one.range}
-FIGURES = tuple(_DRAWN)
-"""Figures in which lanes may differ, in the order of their fields."""
+SENSOR_PARAMETERS = tuple(_DRAWN)
+"""Parameters in which lanes may differ, in the order of their fields."""
 
-Figures: Any = type("Figures", (Rows,), {name: row(one.unit, one.about) for name, one in _DRAWN.items()})
-"""``FIGURES`` as rows."""
+SensorParameters: Any = type("SensorParameters", (Rows,), {name: row(one.unit, one.about) for name, one in _DRAWN.items()})
+"""``SENSOR_PARAMETERS`` as rows."""
 
 WAVES = 3
 
@@ -47,7 +47,7 @@ class Unit(Rows):
 class Errors(Rows):
     """What is wrong with the sensors of a lane: the figures, and what is worked out from them and from what was drawn."""
 
-    figures = part(Figures, "of the sensors")
+    parameters = part(SensorParameters, "of the sensors")
     gain = rows("x y", "1", "error of the force's gain")
     crosstalk = rows("x y", "1", "of the other axis of the force")
     bias = rows("x y", "N", "of the force")
@@ -114,31 +114,31 @@ def field(errors: Errors, i: int, axis: int, x: float, y: float) -> float:
 
 
 @kernel
-def work_out(figures: Any, unit: Unit, shared: Shared, errors: Errors) -> None:
-    """Fill the ``errors`` of L lanes from ``figures`` and what an episode has drawn, ``unit`` in [-1, 1)."""
-    for i in range(figures.rows.shape[1]):
-        for k in range(figures.rows.shape[0]):
-            errors.figures.rows[k, i] = figures.rows[k, i]
+def work_out(parameters: Any, unit: Unit, shared: Shared, errors: Errors) -> None:
+    """Fill the ``errors`` of L lanes from ``parameters`` and what an episode has drawn, ``unit`` in [-1, 1)."""
+    for i in range(parameters.rows.shape[1]):
+        for k in range(parameters.rows.shape[0]):
+            errors.parameters.rows[k, i] = parameters.rows[k, i]
         for axis in range(2):
-            errors.gain[axis, i] = figures.force_gain_error[i] * unit.gain[axis, i]
-            errors.crosstalk[axis, i] = figures.force_crosstalk[i] * unit.crosstalk[axis, i]
-            errors.bias[axis, i] = figures.force_bias[i] * unit.bias[axis, i]
+            errors.gain[axis, i] = parameters.force_gain_error[i] * unit.gain[axis, i]
+            errors.crosstalk[axis, i] = parameters.force_crosstalk[i] * unit.crosstalk[axis, i]
+            errors.bias[axis, i] = parameters.force_bias[i] * unit.bias[axis, i]
         for chamber in range(4):
-            errors.cells[chamber, i] = figures.pressure_bias[i] * unit.cells[chamber, i]
-        errors.scaled[i] = figures.position_scale_error[i] * unit.scale[i]
-        turns = -2.0 * math.pi * figures.force_bandwidth[i] * shared.period
+            errors.cells[chamber, i] = parameters.pressure_bias[i] * unit.cells[chamber, i]
+        errors.scaled[i] = parameters.position_scale_error[i] * unit.scale[i]
+        turns = -2.0 * math.pi * parameters.force_bandwidth[i] * shared.period
         errors.passed[i] = 1.0 - exact.exp(turns) if turns < 0.0 else 1.0
-        errors.delay[i] = figures.force_latency[i] / shared.period
-        errors.force_step[i] = _step(2.0 * shared.force_range, figures.adc_bits[i])
-        errors.pressure_step[i] = _step(shared.pressure_range, figures.adc_bits[i])
-        errors.opening_step[i] = _step(2.0, figures.dac_bits[i])
-        number = 2.0 * math.pi / figures.distortion_length[i]
+        errors.delay[i] = parameters.force_latency[i] / shared.period
+        errors.force_step[i] = _step(2.0 * shared.force_range, parameters.adc_bits[i])
+        errors.pressure_step[i] = _step(shared.pressure_range, parameters.adc_bits[i])
+        errors.opening_step[i] = _step(2.0, parameters.dac_bits[i])
+        number = 2.0 * math.pi / parameters.distortion_length[i]
         for k in range(2 * WAVES):
             direction, wave = math.pi * unit.waves[2 * k, i], Wave(errors.waves[k * Wave.size : (k + 1) * Wave.size])
             wave.number[0, i], wave.number[1, i] = number * exact.cosine(direction), number * exact.sine(direction)
             wave.phase[i] = math.pi * unit.waves[2 * k + 1, i]
         # Each sine has a mean square of a half.
-        errors.height[i] = figures.position_distortion[i] * math.sqrt(2.0 / WAVES)
+        errors.height[i] = parameters.position_distortion[i] * math.sqrt(2.0 / WAVES)
         for axis in range(2):
             errors.registered[axis, i] = field(errors, i, axis, shared.registration[0], shared.registration[1])
 

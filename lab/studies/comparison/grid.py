@@ -25,7 +25,7 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.assembly import Arguments
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.parts.sensors.model import drawn_by
-from birthsim_env.parts.sensors.sensor_errors import FIGURES
+from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
 from lab.studies.comparison.paired import paired_ratios, summary_with_interval
@@ -154,7 +154,7 @@ def _place(folder: Path) -> str:
 def as_described(rig: Parameters) -> Parameters:
     """``rig`` whose sensors stay as they are described where everything else of it is drawn."""
     board = rig.to_dict()["electronics"]
-    ranges = {f"electronics.{name}": [board.get(name, getattr(rig.electronics, name))] * 2 for name in FIGURES}
+    ranges = {f"electronics.{name}": [board.get(name, getattr(rig.electronics, name))] * 2 for name in SENSOR_PARAMETERS}
     return Parameters.from_dict({**rig.to_dict(), "randomize": ranges})
 
 

@@ -26,14 +26,14 @@ def _trainings(folder: Path) -> dict[str, Any]:
 
 def _training(valid: dict[str, Any], rng: Rng, folder: Path, case: Case) -> None:
     from agents.reports.card import settings_of
-    from agents.reports.learning_curves import FIGURES, learning_curves
+    from agents.reports.learning_curves import METRICS, learning_curves
     from birthsim_env.physics.rig.parameters import Parameters
 
     written(case, folder / "training.json", json_bytes(rng, valid))
     (training,) = learning_curves([folder])
     case.names = ()
     for point in (training["law"], *training["curve"]):
-        assert all(point[name] is None or math.isfinite(point[name]) for name, _ in FIGURES)
+        assert all(point[name] is None or math.isfinite(point[name]) for name, _ in METRICS)
     Parameters.from_dict(settings_of(folder)["rig"])
 
 

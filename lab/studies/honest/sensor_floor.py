@@ -19,7 +19,7 @@ from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import forces_of
 from birthsim_env.parts.sensors.honest import HonestSensors
-from birthsim_env.parts.sensors.sensor_errors import FIGURES
+from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.reward import SETTLED
@@ -124,7 +124,7 @@ def _spring(force: Array, stiffness: Array) -> Array:
 
 def static_only(rig: Parameters) -> Parameters:
     """``rig`` whose sensors have no errors but ``STATIC``, which are drawn as those of ``rig``."""
-    others = {f"electronics.{name}": 0.0 for name in FIGURES if name not in STATIC}
+    others = {f"electronics.{name}": 0.0 for name in SENSOR_PARAMETERS if name not in STATIC}
     ranges = {name: (low, high) for name, low, high in rig.ranges} | {name: (0.0, 0.0) for name in others}
     return replace(rig.replace(others), ranges=tuple((name, *pair) for name, pair in ranges.items()))
 
