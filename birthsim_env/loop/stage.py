@@ -178,7 +178,7 @@ def address_of(stage: Any) -> int:
     return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
 
 
-@dataclass
+@dataclass(eq=False)
 class Stage:
     """A compiled stage with what is its own.
 

@@ -39,6 +39,10 @@ BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 ``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
 
 
+DEBUG = os.environ.get("BIRTHSIM_DEBUG", "0") not in ("", "0")
+"""Whether kernels stay plain Python, which a debugger can enter."""
+
+
 class _DiskCache(NullCache):
     """Machine code of one function: a file per signature and processor."""
 
