@@ -18,6 +18,7 @@ from birthsim_env.loop.stage import Part, Stage, address_of, carray, described, 
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.dynamics import load, store
 
 WORTH_A_THREAD = 300
@@ -133,7 +134,7 @@ class Loop:
     def _spread(self, work: Callable[[int, int, int], int], periods: int, threads: int) -> int:
         """The sum of ``work(periods, first, last)`` over lanes from ``first`` to ``last``, spread over threads."""
         blocks = -(-self._lanes // BLOCK)
-        parts = max(1, min(threads, blocks, self._lanes * periods // WORTH_A_THREAD))
+        parts = 1 if DEBUG else max(1, min(threads, blocks, self._lanes * periods // WORTH_A_THREAD))
         edges = [BLOCK * (blocks * k // parts) for k in range(parts)] + [self._lanes]
         # What runs in a thread holds this loop, and with it the arrays that it knows by address.
         waiting = [_pool(os.getpid(), parts - 1).submit(work, periods, edges[k], edges[k + 1]) for k in range(1, parts)]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Self, overload
 
 from birthsim_env.loop.stage import Part, Stage, layouts_of
-from birthsim_env.physics.compiled.compilation import DEBUG
+from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.rig.values import near, shown
 
 ORDER = ("actuation", "board", "plant", "target", "setpoints", "start", "hand", "jumps", "sensors", "outcome")
