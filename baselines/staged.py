@@ -29,7 +29,7 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
-from birthsim_env.parts.actuation import Forgetful
+from birthsim_env.parts.actuation import Actuation
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.plant import Plant
@@ -355,7 +355,7 @@ def ask(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: 
     return 0
 
 
-class Driving(Forgetful):
+class Driving(Actuation):
     """A controller as an actuation, called back once per control period. A policy step has no action.
 
     With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``options`` are those of

@@ -11,6 +11,7 @@ from baselines.registry import compiled_names, make_controller
 from baselines.staged import StagedController
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
 from birthsim_build.stages import enter_scenario, outside, pair_valves
+from birthsim_env.loop import pipeline
 from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, SEEN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import plant_stage
@@ -18,11 +19,16 @@ from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
-ORDER = (
-    "policy", "law", "valves", "board", "plant", "clock", "target", "setpoints", "hand", "inputs", "start", "jumps", "sensors",
-    "show",
-)  # fmt: skip
-"""Parts in the order in which a control period runs them; the page alone has policy, start and show."""
+_BUILT = {
+    "actuation": ("policy", "law", "valves"),
+    "target": ("clock", "target"),
+    "start": (),
+    "hand": ("hand", "inputs", "start", "rest"),
+    "outcome": ("show",),
+}
+ORDER = tuple(name for step in pipeline.ORDER for name in _BUILT.get(step, (step,)))
+"""Parts in the order in which a control period runs them: that of an environment, with a person's inputs, on which a start on
+the page depends. The page alone has policy, start, rest (what its plant then remembers) and show."""
 
 CLOCK, INPUTS = (Part((Stage(one, memory=INPUT_MEMORY),), {}) for one in (enter_scenario, outside))
 """The parts around those of a scenario."""
@@ -46,9 +52,10 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
     env: Any = gymnasium.make_vec(environment, num_envs=1, sensors=sensors, parameters=rig, policy_period=period)
     env.reset(seed=seed)
     simulation = env.unwrapped.simulation
-    parts = {name: Part(tuple(stages), {}) for name, stages in simulation.parts().items() if name != "actuation"}
+    groups = {name: simulation.pipeline.group(name) for name in pipeline.ORDER if name not in ("actuation", "outcome")}
+    parts = {name: Part(tuple(stages), {}) for name, stages in groups.items() if stages}
     parts |= {"clock": CLOCK, "inputs": INPUTS}
-    parts = {name: parts[name] for name in ORDER if name in parts and parts[name].stages}
+    parts = {name: parts[name] for name in ORDER if name in parts}
     return World(np.concatenate(simulation.rows())[:, 0], parts, simulation.sensors.sampled)
 
 

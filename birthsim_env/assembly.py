@@ -82,9 +82,6 @@ LONGEST, LONGEST_PERIOD = 3600.0, 1.0
 MOST_THREADS = 1024
 """Threads of an environment."""
 
-PROTOCOL = ("size", "names", "memory_names", "every_period", "begin", "accept", "openings", "memory")
-"""What an ``Actuation`` has."""
-
 ROUNDING = 2.0**-20
 """So far beyond 1 an action still counts as 1: eight units in the last place of a single, as rounding may leave them."""
 
@@ -149,8 +146,8 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     sensors = entry("sensors", given["sensors"]).name
     one_of("force_sensor", given["force_sensor"], (True, False))
     one_of("clip_actions", given["clip_actions"], (True, False))
-    if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
-        raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object with {', '.join(PROTOCOL)}")
+    if not isinstance(actuation, Actuation | None):
+        raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object of a class derived from Actuation")
     chosen = actuation or ACTUATIONS[one_of("action_mode", given["action_mode"], tuple(ACTUATIONS))](valves)
     for name, length, most in (("size", chosen.size, MOST_ACTIONS), ("memory_names", len(chosen.memory_names), MOST_SHOWN)):
         if not length <= most:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.assembly import Arguments, Setup, assemble, checked_actions
 from birthsim_env.drawing.scene import Scene
+from birthsim_env.loop.pipeline import Pipeline
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.drawn.seeding import lane_seeds
@@ -53,8 +54,7 @@ class Episodes:
             self.simulation.period,
             self.simulation.parameters.mechanics.impact_speed,
         )
-        beginning, closing = self._outcome.stages()
-        self.simulation.beginning, self.simulation.closing = [beginning], [closing]
+        self.simulation.outcome = self._outcome
         self._renderer: Renderer | None = None
         self._path: Array | None = None
 
@@ -62,16 +62,19 @@ class Episodes:
         """Without the renderer, whose surfaces belong to this process, and the path, which is drawn: made when asked for."""
         return {**self.__dict__, "_renderer": None, "_path": None}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """The simulation's copies of what closes a policy step are those of the outcome."""
-        self.__dict__.update(state)
-        beginning, closing = self._outcome.stages()
-        self.simulation.beginning, self.simulation.closing = [beginning], [closing]
-
     @property
     def setup(self) -> Setup:
         """What the episodes are made of."""
         return self._setup
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The steps of a control period; another pipeline may be assigned, see ``birthsim_env.loop.pipeline``."""
+        return self.simulation.pipeline
+
+    @pipeline.setter
+    def pipeline(self, pipeline: Pipeline) -> None:
+        self.simulation.pipeline = pipeline
 
     @property
     def begun(self) -> bool:

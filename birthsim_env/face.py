@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from birthsim_env.assembly import RENDER_MODES
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
+from birthsim_env.loop.pipeline import Pipeline
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.state import State
@@ -61,6 +62,19 @@ class Face:
     def dt(self) -> float:
         """s of a policy step."""
         return self._episodes.setup.policy_period
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """What a control period runs: one tuple of named steps, which can be printed and edited by name.
+
+        ``env.unwrapped.pipeline = env.unwrapped.pipeline.replace("sensors", my_stage)`` changes it from the next step on, also
+        for later episodes; ``before``, ``after`` and ``without`` too (``birthsim_env.loop.pipeline.Pipeline``).
+        """
+        return self._episodes.pipeline
+
+    @pipeline.setter
+    def pipeline(self, pipeline: Pipeline) -> None:
+        self._episodes.pipeline = pipeline
 
     def get_state(self) -> State:
         """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.

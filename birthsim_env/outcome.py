@@ -1,11 +1,12 @@
 """What closes a policy step: reward, success, info and observation of all lanes, as one stage of the closed loop."""
 
-from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env import info, observation, reward
+from birthsim_env.loop.pipeline import Step
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Mask, compliant_offset
 from birthsim_env.loop.stage import Stage, block, singles, table2
@@ -13,6 +14,7 @@ from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+from birthsim_env.restored import Declared
 
 
 class Memory(Rows):
@@ -80,6 +82,8 @@ class Outcome:
     - ``seen`` (N, size): observations.
     """
 
+    in_state: ClassVar[Declared] = {"_constants": None}
+
     def __init__(
         self, lanes: int, nominal: Array, actions: int, shown: int, policy_period: float, period: float, impact_speed: float
     ) -> None:
@@ -110,7 +114,8 @@ class Outcome:
         """Forget the past of the lanes of a mask (N,)."""
         self._memory[:, lanes], Memory(self._memory).fresh[lanes] = 0.0, 1.0
 
-    def stages(self) -> Sequence[Stage]:
-        """What runs where episodes begin, and after a policy step."""
+    def step(self) -> Step:
+        """What closes a policy step, and runs where episodes begin."""
         tables = (self.terms, self.ends, self.rows, self.seen)
-        return [Stage(_close, about, self._memory, tables) for about in self._constants]
+        begin, close = (Stage(_close, about, self._memory, tables) for about in self._constants)
+        return Step("outcome", close, begin, closes=True, built_in=True)

@@ -1,8 +1,8 @@
 """N lanes of a scenario: plant, sensors, reference, hand and stiffness setpoints on one clock.
 
-The environments are thin faces of this class. A control period is a fixed order of stages: the actuation opens the valves, the
-plant moves, and then reference, hand and sensors are brought to the new instant. What comes with the package is compiled, and
-all periods of a policy step are one call; the loop stops only for what a user has written in Python.
+The environments are thin faces of this class. A control period is a fixed order of steps, its ``pipeline``: the actuation opens
+the valves, the plant moves, and then reference, hand and sensors are brought to the new instant. What comes with the package is
+compiled, and all periods of a policy step are one call; the loop stops only for what a user has written in Python.
 """
 
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -10,37 +10,31 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.called import Parts
 from birthsim_env.loop import rows as at
-from birthsim_env.loop.instant import Instant
 from birthsim_env.loop.loop import MixedLoop, Place
-from birthsim_env.loop.rows import fill_measurement
+from birthsim_env.loop.pipeline import ORDER, Called, Pipeline, Step, group_of
 from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.loop.stage import Part, Stage, stage_of
-from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
+from birthsim_env.loop.world import AT_PLACE, GOES_ON, ON_TARGET, Start, jump_stage, no_force_stage, plant_stage, start_stages
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import check_knots, checked_start
 from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.streams import begin, worlds
-from birthsim_env.parts.hands.user_forces import UserForce, forces_of
+from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import plain
 from birthsim_env.physics.strength import require_carried
 from birthsim_env.registry import entry
-from birthsim_env.restored import Declared, Kept, is_own
+from birthsim_env.restored import Declared, is_own
 
 if TYPE_CHECKING:
     from birthsim_env.gradients.recorder import Pullback
-
-LOOKS = ("target", "setpoints", "hand", "jumps", "sensors")
-"""Parts that run where an episode begins."""
 
 
 class Runs(Protocol):
@@ -49,15 +43,20 @@ class Runs(Protocol):
     def run(self, periods: int, threads: int) -> int: ...
 
 
-class Simulation(Instant):
+class Closes(Protocol):
+    """What closes a policy step, and looks at where an episode begins."""
+
+    def step(self) -> Step: ...
+
+
+class Simulation(Parts):
     """``num_envs`` lanes under one actuation, at the ``Instant`` that ``begin`` and every ``step`` lead to.
 
-    ``period`` is the control period, s, and ``periods`` of them make a policy step. ``beginning`` stages run where episodes
-    begin, ``closing`` stages at the end of a policy step. ``watch`` adds stages that look on in every control period.
-    ``threads`` share the lanes. Without a ``force_sensor`` the measured force of the hand is zero.
+    ``period`` is the control period, s, and ``periods`` of them make a policy step. ``threads`` share the lanes. Without a
+    ``force_sensor`` the measured force of the hand is zero. ``outcome`` closes a policy step, where there is one.
     """
 
-    in_state: ClassVar[Declared] = {"_sample": Kept(0, 2**62, whole=True), "_samples": Kept(grows=True), "threads": None}
+    in_state: ClassVar[Declared] = {"threads": None, "outcome": None, "start": None, "_order": None, "_known": None}
 
     def __init__(
         self,
@@ -73,32 +72,29 @@ class Simulation(Instant):
         threads: int = 1,
         force_sensor: bool = True,
     ) -> None:
-        super().__init__(parameters, num_envs)
+        model: SensorModel = entry("sensors", sensors).made(parameters.electronics, num_envs)
+        super().__init__(parameters, num_envs, trajectory, user_force, stiffness, model, actuation, periods)
         self.nominal = parameter_column(parameters)
-        self.trajectory, self.user_force, self.stiffness = trajectory, user_force, stiffness
-        self.sensors: SensorModel = entry("sensors", sensors).made(parameters.electronics, num_envs)
-        of_sensors = {name: ranges[name] for name in ranges if name in self.sensors.drawn}
+        of_sensors = {name: ranges[name] for name in ranges if name in model.drawn}
         if of_sensors:
-            self.sensors.vary(of_sensors)
-        self.actuation = actuation
+            model.vary(of_sensors)
         for part in (trajectory, user_force, stiffness):
             if is_own(type(part)):
                 vars(part).update({name: plain(value) for name, value in vars(part).items()})
             part.prepare(num_envs)
-        self.period = parameters.electronics.control_period
-        self.periods, self.threads, self.force_sensor = periods, threads, force_sensor
-        self.beginning: list[Stage] = []
-        self.closing: list[Stage] = []
-        self._watching: tuple[list[Stage], list[Stage]] = [], []
+        self.threads, self.force_sensor = threads, force_sensor
+        self.outcome: Closes | None = None
         self.action: Array = np.zeros((actuation.size, num_envs))
         self._jumps: Array = np.zeros((5, num_envs))
-        self._wanted: Array = np.zeros((4, num_envs))
-        self._samples: Array = np.zeros((0, 2, num_envs))
-        self._sample = 0
+        self.start: Array = np.zeros((Start.size, num_envs))
+        """``Start`` of each lane."""
         self.ranges: Ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
         """What is drawn of the rig."""
         self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
+        self._order: tuple[str, ...] | None = None
+        self._known: tuple[str, ...] = ()
+        self._added: dict[str, Step] = {}
         self.made: tuple[Any, ...] = ()
         self._loop, self._look = None, None  # type: tuple[MixedLoop | None, MixedLoop | None]
         self.recorder: Runs | None = None
@@ -108,6 +104,25 @@ class Simulation(Instant):
         """Without the loops, which know addresses."""
         return {**self.__dict__, "_loop": None, "_look": None, "made": (), "recorder": None}
 
+    @property
+    def pipeline(self) -> Pipeline:
+        """The steps of a control period in their order, which can be printed; another pipeline may be assigned.
+
+        Changed by name: ``simulation.pipeline = simulation.pipeline.without("hand")``. It stays so in later episodes.
+        """
+        own = self._built_in()
+        if self._order is None:
+            return own
+        return own.renewed([self._added.get(name, name) for name in self._order], self._known)
+
+    @pipeline.setter
+    def pipeline(self, pipeline: Pipeline) -> None:
+        steps = Pipeline(pipeline)
+        self._known = tuple(step.name for step in self._built_in())
+        self._order = steps.names
+        self._added = {step.name: step for step in steps if not step.built_in}
+        self.forget_loops()
+
     def forget_loops(self) -> None:
         """Build the loops anew at the next step: arrays may be others."""
         self._loop = None
@@ -115,11 +130,11 @@ class Simulation(Instant):
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
     ) -> None:
-        """Start new episodes in the lanes of a mask (N,): draw their world and put the pistons on the reference, in balance.
+        """Start new episodes in the lanes of a mask (N,): draw their world, and run what begins them.
 
-        ``position`` (2,), m, starts the end effector there, at rest, instead. Raises ``ValueError`` for a reference that
-        leaves the workspace within ``duration`` s, a position outside it, and at first for a rig too weak for its weight or a
-        hand that begins later.
+        ``position`` (2,), m, starts the end effector there, at rest, instead of on the reference. Raises ``ValueError`` for a
+        reference that leaves the workspace within ``duration`` s, a position outside it, and at first for a rig too weak for
+        its weight or a hand that begins later.
         """
         chosen = np.flatnonzero(lanes)
         for block, streams in worlds(chosen, seeds, episodes):
@@ -134,20 +149,17 @@ class Simulation(Instant):
         self._tick[:, lanes], self._seen[at.TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
         self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
         rows = checked_start(self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters)
-        motion = rows[:4] if position is None else np.repeat([*position, 0.0, 0.0], len(chosen)).reshape(4, -1)
-        start = motion[:2]
+        first = rows[:2] if position is None else np.repeat(position, len(chosen)).reshape(2, -1)
         if not self._begun:
             # The rig as described: that one of those drawn cannot carry its mass is part of the experiment. So with the hand.
-            require_carried(start, self.parameters)
+            require_carried(first, self.parameters)
             check_knots(self.user_force, chosen, duration)
             self._begun = True
-        inverse_geometry(start, self.parameters)  # refuses what is out of reach
-        joints = np.empty((4, len(chosen)))
-        pistons_at(motion, Rig(self.nominal), joints)
-        own = self.plant.lane_parameters.take(chosen, axis=1)
-        self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
-        self.plant.begin(chosen)
-        self._motion[:] = self.plant.end_effector()
+        inverse_geometry(first, self.parameters)  # refuses what is out of reach
+        start = Start(self.start)
+        start.how[:] = np.where(lanes, ON_TARGET if position is None else AT_PLACE, GOES_ON)
+        if position is not None:
+            start.place[:, lanes] = position[:, None]
         self._assemble()
         self._samples = self._samples[:0]
         acceleration = self._seen[at.ACCELERATION : at.PRESSURE]
@@ -160,8 +172,7 @@ class Simulation(Instant):
                 f"since electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
             )
         acceleration[missing] = 0.0
-        if hasattr(self.actuation, "check"):
-            self.actuation.check(self.measurement)
+        self.actuation.check(self.measurement)
 
     def step(self, actions: Array) -> None:
         """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""
@@ -181,22 +192,15 @@ class Simulation(Instant):
         self.step(actions)
         return recorder.taken()
 
-    def watch(self, commanded: list[Stage], moved: list[Stage]) -> bool:
-        """Add stages to every control period, in place of those that close a policy step: ``commanded`` run when the actuation
-        has opened the valves, ``moved`` when target, hand and rig are at the new instant, before the sensors look.
-
-        Returns whether the loop stops in every period for something that a user has written in Python."""
-        self._watching, self.closing, self.made = (commanded, moved), [], ()
-        self._assemble()
-        return self._loop is not None and self._loop.stops
-
     def run(self, periods: int) -> None:
         """Go on by some control periods under the action that was accepted last."""
+        if self._loop is None:
+            self._assemble()
         self._run(self.recorder or self._loop, periods)
 
     def _run(self, loop: Runs | None, periods: int) -> None:
         if loop is not None and loop.run(periods, self.threads):
-            self.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
+            self.actuation.explain(self.measurement, self.reference)
 
     def places(self) -> tuple[list[Place], list[Place]]:
         """Where the arrays of this class stand in a block: in the world, and in what is seen."""
@@ -209,13 +213,12 @@ class Simulation(Instant):
         seen = [(self._seen, 0), (self.action, at.ACTION), (self._openings, at.OPENING)]
         if actuation.memory_names:
             # A user's own actuation is asked what it shows; a compiled one writes it.
-            own = getattr(actuation, "shown", None)
+            own = actuation.shown
             self._shown = np.zeros((len(actuation.memory_names), lanes)) if own is None else own
             if own is None:
                 self._shown[:] = actuation.memory()
             seen.append((self._shown, at.SHOWN))
-        more = actuation.more_rows(lanes) if hasattr(actuation, "more_rows") else []
-        return world, [*seen, *more]
+        return world, [*seen, *actuation.more_rows(lanes)]
 
     def rows(self) -> tuple[Array, Array]:
         """Copies of the rows of ``World`` and ``Seen`` now, (WORLD, N) and (SEEN, N)."""
@@ -225,83 +228,49 @@ class Simulation(Instant):
                 rows[row : row + len(array)] = array
         return world, seen
 
-    def parts(self, begins: bool = False) -> dict[str, list[Part]]:
-        """What a control period runs, in this order: stages, and methods that call what a user has written in Python.
-
-        Those of ``LOOKS`` also run where an episode ``begins``."""
-        stages = getattr(self.actuation, "stages", None)
-        board = stage_of(self.sensors, "put_out", "board_stage") or self._put_out
-        measure = stage_of(self.sensors, "measure") or self._measure
-        target = stage_of(self.trajectory, "sample") or self._follow
-        setpoints = stage_of(self.stiffness, "sample") or self._set
-        hand = stage_of(self.user_force, "force") or self._push
-        foreign = not all(isinstance(one, Stage) for one in (measure, target, setpoints, hand))
-        return {
-            "actuation": [*stages(self.plant.num_envs, self.sensors.sampled, foreign)] if stages else [self._ask],
-            "board": [board] if self.sensors.has_board else [],
-            "plant": [plant_stage(self.plant.lane_parameters, self.plant.memory, self.period)],
-            "target": [target],
-            "setpoints": [setpoints],
-            "hand": [hand],
-            "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, begins)],
-            "sensors": [measure] if self.force_sensor else [measure, no_force_stage()],
+    def _built_in(self) -> Pipeline:
+        """The steps of the parts: stages, and calls of what a user has written in Python."""
+        measure = stage_of(self.sensors, "measure") or Called(self.sensors, "measure", self._measure)
+        target = stage_of(self.trajectory, "sample") or Called(self.trajectory, "sample", self._follow)
+        setpoints = stage_of(self.stiffness, "sample") or Called(self.stiffness, "sample", self._set)
+        hand = stage_of(self.user_force, "force") or Called(self.user_force, "force", self._push)
+        own = (measure, target, setpoints, hand, *(step.part for step in self._added.values() if step.part is not None))
+        foreign = not all(isinstance(part, Stage) for part in own)
+        opens = self.actuation.stages(self.plant.num_envs, self.sensors.sampled, foreign)
+        plant = plant_stage(self.plant.lane_parameters, self.plant.memory, self.period)
+        begins, jumps = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (True, False))
+        groups = {
+            "actuation": group_of("actuation", [Called(self.actuation, "openings", self._ask)] if opens is None else opens),
+            "board": group_of("board", self._board()),
+            "plant": group_of("plant", [plant]),
+            "target": group_of("target", [target], begins=True),
+            "setpoints": group_of("setpoints", [setpoints], begins=True),
+            "start": group_of("start", start_stages(self.start, self.nominal, plant), begins=True, period=False),
+            "hand": group_of("hand", [hand], begins=True),
+            "jumps": [Step("jumps", jumps, begins, built_in=True)],
+            "sensors": group_of("sensors", [measure, *([] if self.force_sensor else [no_force_stage()])], begins=True),
+            "outcome": [] if self.outcome is None else [self.outcome.step()],
         }
+        return Pipeline(step for name in ORDER for step in groups[name])
+
+    def _board(self) -> list[Part]:
+        """What the sensors' board puts out, where they have one."""
+        if not self.sensors.has_board:
+            return []
+        return [stage_of(self.sensors, "put_out", "board_stage") or Called(self.sensors, "put_out", self._put_out)]
 
     def _assemble(self) -> None:
-        """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
-        lanes, parts, places = self.plant.num_envs, self.parts(), self.places()
-        commanded, moved = self._watching
-        order = {**parts, "actuation": [*parts["actuation"], *commanded], "sensors": [*moved, *parts["sensors"]]}
-        every = [part for group in order.values() for part in group]
+        """Bring the loops up to the pipeline; what is compiled and stands side by side runs in one call."""
+        lanes, pipeline, places = self.plant.num_envs, self.pipeline, self.places()
         # A part may have made room anew, or be another one.
         arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
-        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in every))
+        parts = [*(step.part for step in pipeline), *(step.begin for step in pipeline if step.begin is not step.part)]
+        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in parts))
         if self._loop is not None and made == self.made:
             return
-        looks = [part for name, group in self.parts(begins=True).items() if name in LOOKS for part in group]
-        self._loop = MixedLoop(lanes, *places, every, self.closing)
-        self._look = MixedLoop(lanes, *places, looks, self.beginning)
+        self._loop = MixedLoop(lanes, *places, pipeline.every_period, pipeline.closing)
+        self._look = MixedLoop(lanes, *places, pipeline.beginning)
         self.made = made
-
-    def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
-        """The plant by itself, and the actuation by itself: to be timed, on a copy."""
-        lanes, places, parts = self.plant.num_envs, self.places(), self.parts()
-        return MixedLoop(lanes, *places, parts["plant"]), MixedLoop(lanes, *places, [*parts["actuation"], *parts["board"]])
-
-    def _ask(self, period: int) -> None:
-        if period == 0 or self.actuation.every_period:
-            openings = self.actuation.openings(self.plant, self.measurement, self.reference)
-            self._wanted[:] = checked("actuation.openings(...)", openings, (4, self.plant.num_envs), "1")
-            if self.actuation.memory_names:
-                self._shown[:] = self.actuation.memory()
-        # Anew in every period: the board of the sensors may have put out something else.
-        self._openings[:] = self._wanted
-
-    def _put_out(self, _: int) -> None:
-        self._openings[:] = self.sensors.put_out(self.ticks, self._openings)
-
-    def _follow(self, _: int) -> None:
-        rows = self.trajectory.sample(self.time)
-        self._seen[at.REFERENCE : at.REFERENCE + 8] = checked("reference.sample(time)", rows, (8, self.plant.num_envs), "SI")
-
-    def _set(self, _: int) -> None:
-        rows = self.stiffness.sample(self.time)
-        self._seen[at.REFERENCE + 8 : at.ASKED] = checked("stiffness.sample(time)", rows, (7, self.plant.num_envs), "N/m")
-
-    def _push(self, _: int) -> None:
-        self._sample += 1
-        if self._sample >= len(self._samples):
-            # A hand that does not feel the rig is asked for a policy step at once.
-            count = 1 if self.user_force.closed_loop else self.periods
-            times = (self._tick + np.arange(count)[:, None]) * self.period
-            self._samples = forces_of(self.user_force, times, self._motion[:2].copy(), self._motion[2:].copy()).copy()
-            self._sample = 0
-        self._force[:] = self._samples[self._sample]
-
-    def _measure(self, _: int) -> None:
-        now = self.sensors.measure(self.ticks, self.time, self.motion, self.plant.pressures, self.force)
-        fill_measurement(self._seen, now)
-        self._sampled = now.sampled
 
     def reference_at(self, time: Array) -> Reference:
         """What is asked for at ``time`` (N,) of the present episodes, s."""

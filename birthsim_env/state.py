@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.stage import Stage, Staged
+from birthsim_env.parts.actuation import Actuation
 from birthsim_env.physics.rig.json_reading import parse_json
 from birthsim_env.physics.rig.values import in_line
 from birthsim_env.restored import (
@@ -126,7 +127,9 @@ class _Entry:
 
 def _has_stage(part: Any) -> bool:
     """Whether machine code works on the arrays of a part."""
-    return hasattr(part, "stages") or (isinstance(part, Staged) and type(part).stage is not Staged.stage)
+    if isinstance(part, Staged):
+        return type(part).stage is not Staged.stage
+    return hasattr(part, "stages") and getattr(type(part), "stages", None) is not Actuation.stages
 
 
 class _Walk:

@@ -117,8 +117,11 @@ class Measures:
             period=period, jumped_below=period - 0.5 * period, impact_speed=simulation.parameters.mechanics.impact_speed
         )
         constants = Constants.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
-        see = Stage(_measure, constants, self.own.rows, (window(lanes, period), self.error))
-        self.stops = simulation.watch([see], [Stage(_reward, constants, self.own.rows)])
+        measure = Stage(_measure, constants, self.own.rows, (window(lanes, period), self.error))
+        rewards = Stage(_reward, constants, self.own.rows)
+        # Once the valves are commanded; once target, hand and rig are at the new instant, before the sensors look.
+        pipeline = simulation.pipeline.without("outcome").after("actuation", measure).before("sensors", rewards)
+        simulation.pipeline, self.stops = pipeline, pipeline.stops
 
     def terminated(self) -> NDArray[np.bool_]:
         """Lanes (N,) that have left the physical range since the last call."""

@@ -59,11 +59,10 @@ class RestingRigs(Simulation):
 
     def close(self, hand: Sequence[Part], commanded: Sequence[Part] = (), carry: Sequence[Part] | None = None) -> None:
         """Close the loop: ``hand``, sensors, controller, ``commanded``, board, and the plant, or what ``carry`` makes of it."""
-        parts = self.parts()
-        order = [*hand, *parts["sensors"], *parts["actuation"], *commanded, *parts["board"], *(carry or parts["plant"])]
+        group = self.pipeline.group
+        order = [*hand, *group("sensors"), *group("actuation"), *commanded, *group("board"), *(carry or group("plant"))]
         self._loop = MixedLoop(self.plant.num_envs, *self.places(), order)
-        if hasattr(self.actuation, "check"):
-            self.actuation.check(self.measurement)
+        self.actuation.check(self.measurement)
 
     def path(self, periods: int) -> Array:
         """Go on by some control periods; returns where the end effector was at the beginning of each, m, (T, 2, N)."""

@@ -74,6 +74,6 @@ def _run(
             )
         tick()
 
-    loop.close([follow], [add], [*([carry(loop)] if carry else loop.parts()["plant"]), look])
+    loop.close([follow], [add], [*([carry(loop)] if carry else loop.pipeline.group("plant")), look])
     loop.run(count)
     return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)))

@@ -6,8 +6,6 @@ from birthsim_build.device.drawing import drawing
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.program import Pieces
 from birthsim_env.episodes import Episodes
-from birthsim_env.loop.stage import Stage
-from birthsim_env.loop.world import Start, start_stages
 
 
 def beginning_with(episodes: Episodes) -> Pieces:
@@ -18,13 +16,10 @@ def beginning_with(episodes: Episodes) -> Pieces:
     simulation = episodes.simulation
     pieces_of(simulation)  # refuses what is not compiled
     episodes.begin_first([0], np.zeros(1, dtype=np.int64))
-    parts, own = simulation.parts(begins=True), np.zeros((Start.size, simulation.plant.num_envs))
-    plant, rng = parts["plant"][0], np.random.default_rng(0)
-    assert isinstance(plant, Stage), "refused above"
-    first = [drawing(simulation, own), *parts["target"], *parts["setpoints"], *start_stages(own, simulation.nominal, plant)]
-    looks = [*first, *parts["hand"], *parts["jumps"], *parts["sensors"], *simulation.beginning]
+    draws, rng = drawing(simulation), np.random.default_rng(0)
     # What has looked at the first instant forgets that.
     for part in (simulation.trajectory, simulation.user_force, simulation.stiffness, simulation.sensors):
         part.begin(0, rng)
     episodes.forget(np.arange(simulation.plant.num_envs) == 0)
-    return pieces_of(simulation)._replace(beginning=looks)  # type: ignore[arg-type]
+    pieces = pieces_of(simulation, begins=True)
+    return pieces._replace(beginning=[draws, *pieces.beginning])

@@ -79,8 +79,8 @@ def rows_in(graph: Graph) -> int:
     return sum(operation == "input" for operation, *_ in graph.nodes)
 
 
-def drawing(simulation: Simulation, own: Array) -> Stage:
-    """A stage that draws the world of an episode whose seed and number are in ``own`` (``Start.size``, N).
+def drawing(simulation: Simulation) -> Stage:
+    """A stage that draws the world of an episode whose seed and number are in the simulation's ``Start``, its memory.
 
     It writes rigs and tables, to the bits of ``Simulation.begin``. Raises ``ValueError`` for a part that draws in Python.
     """
@@ -109,7 +109,7 @@ def drawing(simulation: Simulation, own: Array) -> Stage:
     body = [f"mine, drawn, state = slice(lane, lane + n), {room}", *body]
     body += [f"fill({', '.join(['drawn', 'world.rig', *views, 'n'])})", "return 0"]
     text = HEAD + loop(graph, "fill", ["drawn", "rig", *names], outputs) + BEGIN + "".join(f"    {line}\n" for line in body)
-    return Stage(module_of(text).begin, memory=own, tables=tuple(tables))
+    return Stage(module_of(text).begin, memory=simulation.start, tables=tuple(tables))
 
 
 def _begun(part: Any, placed: set[Key], streams: Any) -> list[tuple[Array, Any]]:

@@ -16,8 +16,9 @@ from birthsim_build.device.machine import machine_named
 from birthsim_build.device.program import key_of
 from birthsim_env.assembly import Arguments, Setup, assemble, checked_actions
 from birthsim_env.episodes import Episodes, start_of
+from birthsim_env.loop.pipeline import Pipeline
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.loop.world import Start
+from birthsim_env.loop.world import AT_PLACE, Start
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.registry import register
@@ -63,7 +64,7 @@ class DeviceEpisodes(Episodes):
         named, words = Start(start), Start(start.view(np.int64))
         words.seed[:], words.episode[:] = self._entropy[chosen], self._numbers[chosen]
         if position is not None:
-            named.elsewhere[:], named.place[0], named.place[1] = 1.0, float(position[0]), float(position[1])
+            named.how[:], named.place[0], named.place[1] = AT_PLACE, float(position[0]), float(position[1])
         self._lanes.begin(chosen, start)
         self.elapsed[chosen] = 0
 
@@ -88,6 +89,14 @@ class DeviceEpisodes(Episodes):
         assert self._lanes is not None, "lanes have begun"
         return self._lanes.views[self._places[key_of(array)]]
 
+    @property
+    def pipeline(self) -> Pipeline:
+        return self.simulation.pipeline
+
+    @pipeline.setter
+    def pipeline(self, pipeline: Pipeline) -> None:
+        raise NotImplementedError("pipeline of lanes on a device; allowed: to read it, or to assign one without device=")
+
     def local(self, array: Any) -> NDArray[Any]:
         return self._machine.local(array)
 
@@ -102,7 +111,7 @@ class DeviceEpisodes(Episodes):
         self.there(self.simulation.impacts)[...] = 0.0
         recorder, lanes = self._recorder, self._lanes
         if recorder.advance(lanes) if recorder else lanes.advance(self.simulation.periods):
-            self._setup.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
+            self._setup.actuation.explain(self.measurement, self.reference)
         self.elapsed += 1
         return self.there(self._outcome.terms).copy(), self.there(self._outcome.ends)[0] > 0.0
 

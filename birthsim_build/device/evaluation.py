@@ -1,7 +1,6 @@
 """Evaluations on a device: all episodes run there side by side, with the metrics of ``baselines.bench.evaluation``."""
 
 import copy
-from types import SimpleNamespace
 from typing import Any, Unpack
 
 import gymnasium
@@ -66,13 +65,8 @@ def _begun(
 ) -> tuple[Any, Measures, Pieces]:
     """An environment whose episodes have begun, what is measured in it, and its loop with the stages that measure."""
     period = load_parameters(arguments.get("parameters")).electronics.control_period
-    driver, looks = driving(controller, name), list[Any]()
+    driver = driving(controller, name)
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
     env.reset(seed=seeds)
-    simulation = env.simulation
-    simulation.closing = []
-    about: Any = SimpleNamespace(
-        period=period, plant=simulation.plant, parameters=simulation.parameters, watch=lambda *stages: looks.extend(stages)
-    )
-    measures = Measures(about, env.steps)
-    return env, measures, pieces_of(simulation, *looks)
+    measures = Measures(env.simulation, env.steps)
+    return env, measures, pieces_of(env.simulation)

@@ -1,6 +1,6 @@
 """The loops of environments as ``Pieces``."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from birthsim_build.device.program import Pieces
 from birthsim_build.loops import compiled_law
 from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
+from birthsim_env.loop.pipeline import Called
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Simulation
@@ -17,28 +18,25 @@ SEVERAL = (3, 2)
 """Two numbers of lanes, which tell what lanes have of their own."""
 
 
-def pieces_of(simulation: Simulation, commanded: Sequence[Stage] = (), moved: Sequence[Stage] = ()) -> Pieces:
-    """The loop of lanes that have begun; ``ValueError`` names the argument that is a user's Python, which no device runs.
+NAMES = {"target": "reference", "setpoints": "stiffness", "hand": "user_force", "board": "sensors"}
+"""The argument of an environment that a step is made of, where that has another name."""
 
-    Stages that look on, once the valves are ``commanded`` or the rig has ``moved``, stand where ``Simulation.watch`` puts them.
-    """
-    parts = simulation.parts()
-    parts = {**parts, "actuation": [*parts["actuation"], *commanded], "sensors": [*moved, *parts["sensors"]]}
-    arguments = {
-        "actuation": simulation.actuation, "board": simulation.sensors, "target": simulation.trajectory,
-        "setpoints": simulation.stiffness, "hand": simulation.user_force, "sensors": simulation.sensors,
-    }  # fmt: skip
-    names = {"target": "reference", "setpoints": "stiffness", "hand": "user_force", "board": "sensors"}
-    if isinstance(simulation.actuation, Driving):
-        arguments["actuation"], names["actuation"] = simulation.actuation.controller, "controller"
-    stages = []
-    for part, group in parts.items():
-        for one in group:
-            if not isinstance(one, Stage):
-                owner = type(arguments[part]).__name__
-                raise ValueError(f"{names.get(part, part)} = {owner}, in Python; allowed on a device: what is compiled")
-            stages.append(one)
-    return Pieces(*simulation.places(), stages, simulation.closing)
+
+def pieces_of(simulation: Simulation, begins: bool = False) -> Pieces:
+    """The loop of lanes that have begun, with what runs where an episode ``begins``.
+
+    ``ValueError`` names the argument that is a user's Python, which no device runs."""
+    pipeline = simulation.pipeline
+    for step in pipeline:
+        for part in (step.part, step.begin):
+            if isinstance(part, Stage | None):
+                continue
+            name, owner = NAMES.get(step.group, step.name), part.owner if isinstance(part, Called) else part
+            if isinstance(owner, Driving):
+                name, owner = "controller", owner.controller
+            raise ValueError(f"{name} = {type(owner).__name__}, in Python; allowed on a device: what is compiled")
+    groups: Any = (pipeline.every_period, pipeline.closing, pipeline.beginning if begins else ())
+    return Pieces(*simulation.places(), *groups)
 
 
 def controlled(scenario: str, sensors: str, rig: Parameters, controller: str, seed: int, lanes: int) -> Episodes:

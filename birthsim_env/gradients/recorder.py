@@ -22,11 +22,12 @@ from birthsim_env.gradients.traced import Traced, trace
 from birthsim_env.loop.rows import ACTION, MOTION, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics.compiled.lanes import STATES, Array
+from birthsim_env.physics.rig.values import shown
 from birthsim_env.reward import Terms
 from birthsim_env.simulation import Simulation
 
 OF_TIME = ("target", "setpoints", "jumps")
-"""Parts of a period that are functions of time alone, or conditions; so is a hand that feels nothing."""
+"""Steps of a period that are functions of time alone, or conditions; so is a hand that feels nothing."""
 
 REWARDED, OBSERVED = 0, 3
 """Tables of what closes a policy step (``outcome.Outcome``) that get gradients from outside."""
@@ -101,12 +102,20 @@ class Recorder:
         simulation = self._simulation
         if self._made is simulation.made:
             return
-        parts, places = simulation.parts(), simulation.places()
-        own = [one for group in parts.values() for one in group if not isinstance(one, Stage)]
-        if own:
-            raise ValueError(f"{own[0]}, a user's own part, cannot be differentiated; allowed: those of the package")
-        named = [(name, one) for name, group in parts.items() for one in group if isinstance(one, Stage)]
-        stages, closing = [one for _, one in named], list(simulation.closing)
+        pipeline, places = simulation.pipeline, simulation.places()
+        named, closing = list[tuple[str, Stage]](), list[Stage]()
+        for step in pipeline:
+            if step.part is None:
+                continue
+            if not isinstance(step.part, Stage):
+                raise ValueError(
+                    f"step {step.name!r} = {shown(step.part)}, in Python, cannot be differentiated; allowed: a Stage"
+                )
+            if step.closes:
+                closing.append(step.part)
+            else:
+                named.append((step.group, step.part))
+        stages = [one for _, one in named]
         self.loop = loop = TapedLoop(simulation.plant.num_envs, *places, stages, closing)
         free = OF_TIME if simulation.user_force.closed_loop else (*OF_TIME, "hand")
         pieces: list[tuple[int, Stage | Traced]] = []

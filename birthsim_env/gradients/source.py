@@ -19,11 +19,13 @@ from numba.extending import intrinsic
 from birthsim_env.files import write_text
 from birthsim_env.gradients.graph import Graph, Scalar, Value
 from birthsim_env.physics.compiled.kept import cache_folder
+from birthsim_env.physics.compiled.plain import DEBUG
 
-if TYPE_CHECKING:
+if TYPE_CHECKING or DEBUG:
 
     def choose(condition: bool, yes: float, no: float) -> float:
         """``yes if condition else no`` of numbers that are at hand, without a branch that LLVM could move loads into."""
+        return yes if condition else no
 
 else:
 

@@ -24,6 +24,7 @@ from birthsim_env.gradients.graph import Scalar, Value
 from birthsim_env.gradients.symbols import Picked, Symbols, bounds, under
 from birthsim_env.gradients.syntax import Continues, Rewriter
 from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.plain import REAL
 
 
 class UntraceableError(ValueError):
@@ -123,6 +124,7 @@ INSTEAD: dict[Any, Callable[..., Any]] = {}
 
 def call(function: Any, *arguments: Any, **named: Any) -> Any:
     """A call: helpers are traced, and what is made of numbers alone is computed."""
+    function = REAL.get(function, function)
     if function in INSTEAD:
         return INSTEAD[function](*arguments, **named)
     if not _is_traced((*arguments, *named.values())):

@@ -18,6 +18,7 @@ from birthsim_env.loop.stage import Part, Stage, address_of, carray, described, 
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.dynamics import load, store
 
 WORTH_A_THREAD = 300
@@ -133,7 +134,7 @@ class Loop:
     def _spread(self, work: Callable[[int, int, int], int], periods: int, threads: int) -> int:
         """The sum of ``work(periods, first, last)`` over lanes from ``first`` to ``last``, spread over threads."""
         blocks = -(-self._lanes // BLOCK)
-        parts = max(1, min(threads, blocks, self._lanes * periods // WORTH_A_THREAD))
+        parts = 1 if DEBUG else max(1, min(threads, blocks, self._lanes * periods // WORTH_A_THREAD))
         edges = [BLOCK * (blocks * k // parts) for k in range(parts)] + [self._lanes]
         # What runs in a thread holds this loop, and with it the arrays that it knows by address.
         waiting = [_pool(os.getpid(), parts - 1).submit(work, periods, edges[k], edges[k + 1]) for k in range(1, parts)]
@@ -154,6 +155,9 @@ def sampled(stage: Stage, time: Array, first: int, count: int) -> Array:
     return rows
 
 
+_Piece = Loop | Callable[[int], None]
+
+
 class MixedLoop:
     """Stages, and a user's own Python among them, for which the loop stops: it is called with the number of the period.
 
@@ -166,26 +170,41 @@ class MixedLoop:
         world: Sequence[Place],
         seen: Sequence[Place],
         parts: Sequence[Part],
-        closing: Sequence[Stage] = (),
+        closing: Sequence[Part] = (),
     ) -> None:
-        groups = [(kind, list(group)) for kind, group in groupby(parts, lambda part: isinstance(part, Stage))]
-        self.stops = not all(kind for kind, _ in groups)
+        def pieces(parts: Sequence[Part]) -> list[_Piece]:
+            found: list[_Piece] = []
+            for _, group in groupby(parts, lambda part: isinstance(part, Stage)):
+                alike = list(group)
+                stages = [part for part in alike if isinstance(part, Stage)]
+                found += (
+                    [Loop(lanes, world, seen, stages)] if stages else [part for part in alike if not isinstance(part, Stage)]
+                )
+            return found
+
+        stages = [[part for part in group if isinstance(part, Stage)] for group in (parts, closing)]
+        self.stops = len(stages[0]) < len(parts)
         """Whether a user's own Python is among the parts."""
-        self._pieces: list[Loop | Callable[[int], None]] = []
-        for kind, group in groups:
-            stages = [part for part in group if isinstance(part, Stage)]
-            self._pieces += [Loop(lanes, world, seen, stages, () if self.stops else closing)] if kind else group  # type: ignore[arg-type]
-        self._closing = Loop(lanes, world, seen, (), closing)
+        compiled = not self.stops and len(stages[1]) == len(closing)
+        self._whole = Loop(lanes, world, seen, *stages) if compiled else None
+        self._pieces = [self._whole] if self._whole else pieces(parts)
+        self._closing = [] if self._whole else pieces(closing)
 
     def run(self, periods: int = 1, threads: int = 1) -> int:
         """Run ``periods`` control periods; returns how many lanes and periods a stage could not serve."""
-        if not self.stops:
-            return sum(piece.run(periods, threads) for piece in self._pieces if isinstance(piece, Loop))
+        if self._whole is not None:
+            return self._whole.run(periods, threads)
         missed = 0
         for period in range(periods):
-            for piece in self._pieces:
-                if isinstance(piece, Loop):
-                    missed += piece.run(1, threads)
-                else:
-                    piece(period)
-        return missed + self._closing.run(1, threads)
+            missed += _run_pieces(self._pieces, period, threads)
+        return missed + _run_pieces(self._closing, periods - 1, threads)
+
+
+def _run_pieces(pieces: Sequence[_Piece], period: int, threads: int) -> int:
+    missed = 0
+    for piece in pieces:
+        if isinstance(piece, Loop):
+            missed += piece.run(1, threads)
+        else:
+            piece(period)
+    return missed

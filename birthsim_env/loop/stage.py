@@ -9,81 +9,29 @@ vectorises loops over it. A law is called with zero for the world.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
+from birthsim_env.loop import plain
 from birthsim_env.physics.compiled.compilation import BLOCK, helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.compiled.record_types import block_type
 from birthsim_env.physics.compiled.records import Rows
 
-ARGUMENTS = 7
+if TYPE_CHECKING or not DEBUG:
+    from birthsim_env.loop.machine import call, carray, pointer, scratch
+else:
+    from birthsim_env.loop.plain import call, carray, pointer, scratch
+
+__all__ = ["call", "carray", "pointer", "scratch"]
+
 TABLE = 5
 """Whole numbers that describe a table: its address and up to four dimensions."""
-
-
-if TYPE_CHECKING:
-
-    def carray(place: Any, shape: tuple[int, ...]) -> NDArray[Any]:
-        """The array of a shape at a place in memory."""
-
-    def pointer(address: int, kind: type) -> Any:
-        """Pointer to numbers of ``kind`` at an address."""
-
-    def call(address: int, *arguments: int) -> int:
-        """Call the stage at an address."""
-
-    def scratch(rows: int) -> Array:
-        """A block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
-
-else:
-    from numba import carray
-
-    @intrinsic
-    def pointer(context, address, kind):
-        """Pointer to numbers of ``kind`` at an address."""
-        target = types.CPointer(kind.dtype)
-
-        def generate(context, builder, signature, arguments):
-            return builder.inttoptr(arguments[0], context.get_value_type(target))
-
-        return target(address, kind), generate
-
-    @intrinsic
-    def call(context, address, *arguments):
-        """Call the stage at an address."""
-        signature = types.int64(types.int64, types.StarArgTuple.from_types(arguments))
-
-        def generate(context, builder, signature, given):
-            number = ir.IntType(64)
-            function = builder.inttoptr(given[0], ir.FunctionType(number, [number] * ARGUMENTS).as_pointer())
-            return builder.call(function, [builder.extract_value(given[1], k) for k in range(ARGUMENTS)])
-
-        return signature, generate
-
-    @intrinsic(prefer_literal=True)
-    def scratch(context, rows):
-        """A block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
-        array = types.Array(types.float64, 2, "C")
-
-        def generate(context, builder, signature, arguments):
-            shape = (rows.literal_value, BLOCK)
-            data = cgutils.alloca_once(builder, ir.DoubleType(), size=shape[0] * BLOCK)
-            number = partial(context.get_constant, types.intp)
-            made = make_array(array)(context, builder)
-            strides = [number(8 * BLOCK), number(8)]
-            populate_array(made, data, [number(size) for size in shape], strides, number(8), None)
-            return made._getvalue()
-
-        return array(rows), generate
 
 
 @helper
@@ -164,7 +112,9 @@ def layouts_of(stage: Any) -> list[type[Rows] | None]:
 
 
 def compiled(stage: Any) -> Any:
-    """What Numba made of a stage; compiled when it is first asked for."""
+    """What Numba made of a stage; compiled when it is first asked for. ``RuntimeError`` where kernels are plain Python."""
+    if DEBUG:
+        raise RuntimeError("BIRTHSIM_DEBUG = 1: nothing is compiled; allowed: to build, and to use a device, without it")
     arguments = tuple(block_type(layout) if layout else types.int64 for layout in layouts_of(stage))
     if arguments not in stage.overloads:
         stage.compile(types.int64(*arguments))
@@ -173,12 +123,14 @@ def compiled(stage: Any) -> Any:
 
 @cache
 def address_of(stage: Any) -> int:
-    """Where the machine code of a stage begins."""
+    """Where the machine code of a stage begins; where kernels are plain Python, a number that stands for it."""
+    if DEBUG:
+        return plain.address_of(stage, layouts_of(stage))
     made = compiled(stage)
     return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
 
 
-@dataclass
+@dataclass(eq=False)
 class Stage:
     """A compiled stage with what is its own.
 

@@ -2,7 +2,7 @@
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Point
-from birthsim_env.loop.stage import Stage, scratch
+from birthsim_env.loop.stage import Stage, scratch, table2
 from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import INVERSE_SUPPLY, SOURCE, STATES, SUPPLY, V1, V2, Y1, Y2, Array, Rig
@@ -10,7 +10,7 @@ from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, r
 from birthsim_env.physics.equilibrium import balance
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.options import SCRATCH
+from birthsim_env.physics.options import FURTHER, SCRATCH
 
 
 class Clock(Numbers):
@@ -29,7 +29,7 @@ class InnerCommands(Rows):
 class FurtherStates(InnerCommands):
     """What the options of ``physics.options`` remember besides."""
 
-    further = rows(options.FURTHER, "SI", "further states")
+    further = rows(FURTHER, "SI", "further states")
 
 
 @helper
@@ -88,12 +88,16 @@ def plant_stage(rigs: Array, memory: Array, period: float) -> Stage:
     return Stage(_plant, clock) if spools.are_perfect(rigs) else Stage(_worn_plant, clock, memory[: InnerCommands.size])
 
 
+GOES_ON, ON_TARGET, AT_PLACE = -1.0, 0.0, 1.0
+"""How a lane fares where episodes begin: its own goes on, or one begins on the target, or at a place; ``Start.how``."""
+
+
 class Start(Rows):
     """With what an episode begins."""
 
     seed = row("1", "of the lane, the bits of a whole number")
     episode = row("1", "number of the episode, likewise")
-    elsewhere = row("1", "1 to begin at a place, at rest, instead of on the target")
+    how = row("1", "0 to begin on the target, moving with it; 1 at a place, at rest; -1 where the lane's episode goes on")
     place = rows("x y", "m", "that place, of the end effector")
 
 
@@ -110,47 +114,69 @@ class NominalRig(Numbers):
     rig = part(Rig, "as described")
 
 
-@helper
-def _settle(world: World, seen: Seen, own: Start, constants: NominalRig, n: int) -> None:
-    """Put the pistons on the target, or where they are to start, the chambers in balance."""
-    motion, joints, asked = Point(scratch(Point.size)), Joints(scratch(Joints.size)), seen.reference
+@kernel
+def _start(world: World, seen: Seen, own: Start, constants: NominalRig, tables: int, lane: int, n: int) -> int:
+    """Puts the pistons on the target, or where they are to start, the chambers in balance."""
+    motion, joints, x = Point(scratch(Point.size)), Joints(scratch(Joints.size)), scratch(STATES)
+    asked, p = seen.reference, world.rig[:, :n]
     for i in range(n):
-        elsewhere = own.elsewhere[i] > 0.0
+        at_place = own.how[i] > 0.0
         for axis in range(2):
-            motion.position[axis, i] = own.place[axis, i] if elsewhere else asked.position[axis, i]
-            motion.velocity[axis, i] = 0.0 if elsewhere else asked.velocity[axis, i]
+            motion.position[axis, i] = own.place[axis, i] if at_place else asked.position[axis, i]
+            motion.velocity[axis, i] = 0.0 if at_place else asked.velocity[axis, i]
     piston_motion(motion.rows, constants.rig, joints.rows, n)
     for i in range(n):
-        world.state[Y1, i], world.state[Y2, i] = joints.position[0, i], joints.position[1, i]
-        world.state[V1, i], world.state[V2, i] = joints.velocity[0, i], joints.velocity[1, i]
-    balance(world.state[:, :n], asked.pneumatic_stiffness, world.rig[:, :n])
-    end_effector_motion(world.state[:, :n], world.rig[:, :n], world.motion.rows[:, :n])
+        x[Y1, i], x[Y2, i] = joints.position[0, i], joints.position[1, i]
+        x[V1, i], x[V2, i] = joints.velocity[0, i], joints.velocity[1, i]
+    balance(x[:, :n], asked.pneumatic_stiffness, p)
+    for k in range(STATES):
+        for i in range(n):
+            world.state[k, i] = x[k, i] if own.how[i] >= 0.0 else world.state[k, i]
+    end_effector_motion(world.state[:, :n], p, world.motion.rows[:, :n])
+    return 0
+
+
+@helper
+def _forget(inner: Array, start: Start, n: int) -> None:
+    """Valves have not moved yet where an episode begins."""
+    for valve in range(4):
+        for i in range(n):
+            inner[valve, i] = 0.0 if start.how[i] >= 0.0 else inner[valve, i]
 
 
 @kernel
-def _start(world: World, seen: Seen, own: Start, constants: NominalRig, tables: int, lane: int, n: int) -> int:
-    _settle(world, seen, own, constants, n)
+def _forget_valves(world: int, seen: int, memory: InnerCommands, constants: int, tables: int, lane: int, n: int) -> int:
+    _forget(memory.inner, Start(table2(tables, 0)[:, lane : lane + n]), n)
     return 0
 
 
 @kernel
-def _rest(world: World, seen: Seen, memory: FurtherStates, constants: int, tables: int, lane: int, n: int) -> int:
-    """What the options of ``physics.options`` begin with."""
-    p = world.rig
+def _rest(world: World, seen: int, memory: FurtherStates, constants: int, tables: int, lane: int, n: int) -> int:
+    """As ``_forget_valves``, and what the options of ``physics.options`` begin with. Table: ``Start``."""
+    start, p, further = Start(table2(tables, 0)[:, lane : lane + n]), world.rig, scratch(FURTHER)
+    _forget(memory.inner, start, n)
     for i in range(n):
-        p[SUPPLY, i], p[INVERSE_SUPPLY, i] = p[SOURCE, i], 1.0 / p[SOURCE, i]
-    options.rest(world.state[:, :n], p[:, :n], memory.further[:, :n])
+        supply, inverse = p[SOURCE, i], 1.0 / p[SOURCE, i]
+        p[SUPPLY, i] = supply if start.how[i] >= 0.0 else p[SUPPLY, i]
+        p[INVERSE_SUPPLY, i] = inverse if start.how[i] >= 0.0 else p[INVERSE_SUPPLY, i]
+    options.rest(world.state[:, :n], p[:, :n], further[:, :n])
+    for k in range(FURTHER):
+        for i in range(n):
+            memory.further[k, i] = further[k, i] if start.how[i] >= 0.0 else memory.further[k, i]
     options.port_motion(world.state[:, :n], memory.further[:, :n], p[:, :n], world.motion.rows[:, :n])
     return 0
 
 
 def start_stages(start: Array, nominal: Array, plant: Stage) -> list[Stage]:
-    """What puts the ``plant`` where episodes begin, once target and setpoints are known, to the bits of ``Simulation.begin``.
+    """The start of an episode, wherever one begins: what puts the ``plant`` there, once target and setpoints are known.
 
-    ``start`` (``Start.size``, N) is ``Start``, ``nominal`` (PARAMETERS,) the rig as described.
+    ``start`` (``Start.size``, N) is ``Start``, ``nominal`` (PARAMETERS,) the rig as described, ``plant`` what ``plant_stage``
+    made.
     """
     first = Stage(_start, NominalRig.numbers(rig=nominal), start)
-    return [first, Stage(_rest, memory=plant.memory)] if plant.function is _optional_plant else [first]
+    if plant.memory is None:
+        return [first]
+    return [first, Stage(_rest if plant.function is _optional_plant else _forget_valves, memory=plant.memory, tables=(start,))]
 
 
 class PreviousSetpoints(Rows):

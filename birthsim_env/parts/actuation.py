@@ -5,15 +5,15 @@ An actuation is asked once per policy step where ``every_period`` is False, else
 """
 
 import math
-from collections.abc import Callable
-from typing import ClassVar, Protocol
+from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 
-from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.loop import Loop, Place
 from birthsim_env.loop.rows import ACTION, OPENING, STATE, Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
@@ -26,45 +26,67 @@ VALVE_LAYOUTS = ("two_valves", "one_valve")
 CHAMBERS = ("P1", "N1", "P2", "N2")
 
 
-class Actuation(Protocol):
-    """What stands between a policy and the valves.
+class Actuation:
+    """What stands between a policy and the valves. One of a user's own derives from it, and has ``openings`` at least.
 
-    ``size`` is the length of an action and ``names`` describes its entries. Four methods make an actuation:
+    The loop stops for ``openings``, once a policy step or once a control period, unless ``stages`` say it compiled.
 
-    - ``begin(lanes)`` starts new episodes in the lanes of a mask (N,);
-    - ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
-    - ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on;
-    - ``memory()`` (M, N) returns what a policy should see of the actuation's state, roughly in [-1, 1]; ``memory_names``
-      describes its rows.
-
-    The loop stops for ``openings``, once a policy step or once a control period. An actuation of the package also has
-    ``stages(lanes, sampled, foreign)``, which are compiled into the loop; ``foreign`` is True where signals come from a
-    user's own Python, and may be anything. Where these show a memory it has the rows ``shown`` (M, N).
-    Its ``explain(measurement, reference)`` raises the error for what the stages could not serve.
+    Attributes
+    ----------
+    size : int
+        Length of an action; 0 where nothing is asked of a policy.
+    names : tuple of str
+        What the entries of an action are, with their units.
+    memory_names : tuple of str
+        The same of the rows of ``memory()``.
+    every_period : bool
+        Whether ``openings`` is asked in every control period, or once a policy step.
+    shown : array (M, N) or None
+        Where ``stages`` write what a policy should see of them; None where ``memory()`` is asked.
     """
 
-    size: int
-    names: tuple[str, ...]
-    memory_names: tuple[str, ...]
-    every_period: bool
-
-    def begin(self, lanes: Mask) -> None: ...
-
-    def accept(self, actions: Array) -> None: ...
-
-    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array: ...
-
-    def memory(self) -> Array: ...
-
-
-class Forgetful:
-    """An actuation without a memory."""
-
+    size: int = 0
+    names: tuple[str, ...] = ()
     memory_names: tuple[str, ...] = ()
+    every_period: bool = True
+
+    @property
+    def shown(self) -> Array | None:
+        """Where ``stages`` write what a policy should see of them, (M, N)."""
+        return None
+
+    def begin(self, lanes: Mask) -> None:
+        """Start new episodes in the lanes of a mask (N,)."""
+
+    def accept(self, actions: Array) -> None:
+        """Take the actions (size, N), in [-1, 1], of a policy step."""
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        """Spool openings of the valves of chambers P1, N1, P2, N2 from this instant on, -1 to 1, (4, N)."""
+        raise NotImplementedError(f"{type(self).__name__}.openings(...) is missing; it returns openings (4, N)")
 
     def memory(self) -> Array:
-        """Nothing."""
+        """What a policy should see of the actuation's state, roughly in [-1, 1], (M, N)."""
         return np.empty((0, 0))
+
+    def stages(self, lanes: int, sampled: bool, foreign: bool) -> Sequence[Part] | None:
+        """``openings``, compiled into the loop of ``lanes`` lanes; None where it is Python.
+
+        ``sampled`` says whether positions are samples, as in ``Measurement``. ``foreign`` is True where signals come from a
+        user's own Python, and may be anything.
+        """
+        return None
+
+    def more_rows(self, lanes: int) -> list[Place]:
+        """Arrays that ``stages`` read or write besides, with the rows of ``Seen`` at which they stand."""
+        return []
+
+    def check(self, measurement: Measurement) -> None:
+        """Raise ``ValueError`` where episodes begin with less than it has to measure."""
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the ``ValueError`` for signals, over N lanes, that a stage could not serve."""
+        raise ValueError(f"{type(self).__name__} could not serve one of the lanes")
 
 
 class Layout(Numbers):
@@ -116,14 +138,13 @@ def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: i
     return 0
 
 
-class _ByLayout(Forgetful):
+class _ByLayout(Actuation):
     """An actuation whose openings a ``kernel`` computes, here and in the closed loop; ``entries`` with a valve per chamber, or
     per cylinder."""
 
     kernel: ClassVar[tuple[Callable[..., int], bool]]
     """And whether it has to see the world."""
     entries: ClassVar[tuple[tuple[str, ...], tuple[str, ...]]]
-    every_period: bool
 
     def __init__(self, layout: str) -> None:
         self._one_valve = layout == "one_valve"

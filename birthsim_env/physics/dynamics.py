@@ -105,6 +105,23 @@ def exchange(
 
 
 @helper
+def piston_friction(
+    x: Array, p: Array, i: int, speed: int, bristle: int, coulomb: int, static: int, viscous: int
+) -> tuple[float, float]:
+    """Friction on a rod, N, positive along the motion that it holds back, and the rate of its bristle, m/s.
+
+    The piston is given by its state rows, and its parameters by theirs.
+    """
+    v, z, s0, fc, fv = x[speed, i], x[bristle, i], p[at.S0, i], p[coulomb, i], p[viscous, i]
+    weakness = friction.inverse_level(v, fc, p[static, i], p[at.STRIBECK, i])
+    is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
+    rate = friction.bristle_rate_by_law(v, z, weakness, s0, is_lugre, p[at.BREAKAWAY, i], p[at.STEEPNESS, i])
+    held = friction.lugre_force(v, z, rate, s0, p[at.S1, i], fv)
+    sliding = friction.coulomb_force(v, fc, fv, p[at.SIGN_SLOPE, i])
+    return held if is_bristle else sliding, rate if is_bristle else 0.0
+
+
+@helper
 def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -> None:
     """dx/dt of ``n`` lanes: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
     for i in range(n):
@@ -113,20 +130,8 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
             y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
         )
 
-        s0, s1 = p[at.S0, i], p[at.S1, i]
-        weakness1 = friction.inverse_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
-        weakness2 = friction.inverse_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
-        is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
-        breakaway, steepness = p[at.BREAKAWAY, i], p[at.STEEPNESS, i]
-        dz1 = friction.bristle_rate_by_law(v1, x[at.Z1, i], weakness1, s0, is_lugre, breakaway, steepness)
-        dz2 = friction.bristle_rate_by_law(v2, x[at.Z2, i], weakness2, s0, is_lugre, breakaway, steepness)
-        bristle1 = friction.lugre_force(v1, x[at.Z1, i], dz1, s0, s1, p[at.FV1, i])
-        bristle2 = friction.lugre_force(v2, x[at.Z2, i], dz2, s0, s1, p[at.FV2, i])
-        coulomb1 = friction.coulomb_force(v1, p[at.FC1, i], p[at.FV1, i], p[at.SIGN_SLOPE, i])
-        coulomb2 = friction.coulomb_force(v2, p[at.FC2, i], p[at.FV2, i], p[at.SIGN_SLOPE, i])
-        friction1 = bristle1 if is_bristle else coulomb1
-        friction2 = bristle2 if is_bristle else coulomb2
-
+        friction1, dz1 = piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
+        friction2, dz2 = piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
         force1 = (
             mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
             - friction1
@@ -145,8 +150,7 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
         )
         dx[at.Y2, i] = v2
         dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
-        dx[at.Z1, i] = dz1 if is_bristle else 0.0
-        dx[at.Z2, i] = dz2 if is_bristle else 0.0
+        dx[at.Z1, i], dx[at.Z2, i] = dz1, dz2
 
         chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
         chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)

@@ -19,7 +19,7 @@ from birthsim_build.stages import Period, enter_sensors, leave_sensors
 from birthsim_env.info import Info
 from birthsim_env.loop.rows import ASKED, WORLD
 from birthsim_env.loop.stage import Stage, stage_of
-from birthsim_env.loop.world import FurtherStates, plant_stage
+from birthsim_env.loop.world import FurtherStates, Start, plant_stage, start_stages
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import Parts, find_scenario
@@ -69,12 +69,16 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     """
     column = parameter_array(rig, 1)
 
-    def plant_part(rigs: Array) -> Part:
-        return _part(plant_stage(rigs, np.zeros((FurtherStates.size, 1)), period))
+    def plant(rigs: Array) -> Stage:
+        return plant_stage(rigs, np.zeros((FurtherStates.size, 1)), period)
 
+    # The code serves worn valves and tubes too, and a start that leaves what any of them remembers.
+    worn, tubes = column.copy(), column.copy()
+    worn[at.DEADBAND], tubes[at.TUBE_RATE] = 0.01, 100.0
     learns = [LEARNING] if policies else []
     chosen = [*names("controller", listed=True), *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period
+    start, rest = start_stages(np.zeros((Start.size, 1)), column[:, 0], plant(tubes))
     laws = {name: law for name in chosen if is_compiled(law := _made(name, rig))}
     made: dict[str, dict[str, Any]] = {
         "scenarios": {name: scenario(name) for name in names("scenario")},
@@ -85,17 +89,15 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     controllers = [controller_choice(name) for name in chosen if name in parts["controllers"] or name not in others]
     tree = {
         "rig": {
-            "plant": plant_part(column), "clock": CLOCK, "inputs": INPUTS,
-            "start": _part(Stage(stages.begin, column[:, 0], np.zeros((FurtherStates.size, 1)))),
+            "plant": _part(plant(column)), "clock": CLOCK, "inputs": INPUTS,
+            "start": _part(start), "rest": _part(rest),
             "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
         },
         "valves": {"two_valves": {}, "one_valve": {"valves": PAIRED_VALVES}},
         **parts,
     }  # fmt: skip
-    if functions is None:  # those of worn valves and of tubes too
-        worn, tubes = column.copy(), column.copy()
-        worn[at.DEADBAND], tubes[at.TUBE_RATE] = 0.01, 100.0
-        functions = sorted(_needed([tree, plant_part(worn), plant_part(tubes)]))
+    if functions is None:
+        functions = sorted(_needed([tree, _part(plant(worn)), _part(plant(tubes))]))
     store, hello = Store(functions), greeting(rig, controllers)
     for kind, group in (("scenario", "scenarios"), ("sensors", "sensors"), ("controller", "controllers")):
         for one in hello["choices"][kind]:

@@ -6,11 +6,12 @@ import pytest
 
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import SIZE
+from birthsim_env.parts.actuation import Actuation
 
 PROBE = "BirthSIM/Probe-v2"
 
 
-class Leaky:
+class Leaky(Actuation):
     """Openings of a table; it remembers how often a lane was asked, and its first ``shown`` actions, each at half the rate."""
 
     def __init__(self, lanes, every_period=True, size=3, shown=1):

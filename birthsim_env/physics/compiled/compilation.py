@@ -29,6 +29,7 @@ from numba.core.registry import CPUDispatcher
 
 import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
+from birthsim_env.physics.compiled.plain import DEBUG, plain
 from birthsim_env.physics.compiled.sources import PACKAGES, source_stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -87,7 +88,11 @@ event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 
 
 def kernel(function: F) -> F:
-    """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
+    """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock.
+
+    With ``BIRTHSIM_DEBUG=1`` it stays plain Python, as a ``helper`` does."""
+    if DEBUG:
+        return plain(function)
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     folder = cache_folder()
     # With the compiler off there is nothing to keep; what a closure or an interactive session holds, no hash of sources knows.
@@ -138,7 +143,9 @@ class _Helper(CPUDispatcher):
 
 def helper(function: F) -> F:
     """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
-    return kernel(function) if numba.config.DISABLE_JIT else _Helper(function)  # type: ignore[return-value, attr-defined]
+    if DEBUG or numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return kernel(function)
+    return _Helper(function)  # type: ignore[return-value]
 
 
 def over(function: Callable[..., Any], *arguments: Any) -> None:

@@ -9,7 +9,7 @@ import { LEARNING, NOTHING, STIFFNESSES, merged } from "./settings.js";
 // Parts that run together.
 const LAW = ["policy", "law"];
 const ASK = ["clock", "target", "setpoints", "hand", "inputs"];
-const START = ["clock", "target", "setpoints", "inputs", "start"];
+const START = ["clock", "target", "setpoints", "inputs", "start", "rest"];
 const MEASURE = ["sensors"];
 const MOVE = ["valves", "board", "plant", ...ASK, ...MEASURE];
 const SHOW = ["show"];
@@ -134,7 +134,7 @@ export class Session {
     this.choose(chosen(settings));
     this.hands.act(this);
     loop.advance(1, START);
-    loop.memory("plant").set(loop.memory("start").subarray(0, loop.memory("plant").length));
+    loop.memory("plant").set(loop.memory("rest").subarray(0, loop.memory("plant").length));
     for (const parts of [ASK, MEASURE]) loop.advance(1, parts);
     this.measured();
     this.putLaw();
