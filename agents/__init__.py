@@ -1,9 +1,12 @@
-"""Learned residuals on top of a control law; importing this package registers the environments of ``birthsim_env``."""
+"""Learned residuals on top of a controller.
+
+Importing this package registers environments with a controller inside, ``BirthSIM/CircleResidual-v1`` and so on.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import birthsim_env as birthsim_env
+from birthsim_env.ids import register_ids
 
 if TYPE_CHECKING:
     from agents.policy.controller import ResidualController
@@ -37,6 +40,9 @@ __all__ = [
     "Policy", "ResidualController", "ResidualSettings", "SB3VecEnv", "ShiftedReward", "TrainingSettings", "export_onnx",
     "load_policy", "save_policy", "train",
 ]  # fmt: skip
+
+
+register_ids("Residual", "agents.residual.env:ResidualEnv", "agents.residual.env:ResidualVectorEnv")
 
 
 def __getattr__(name: str) -> Any:

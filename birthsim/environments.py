@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-import agents as agents
+import agents as agents  # registers ids with a controller inside
 from birthsim_env.physics.rig.values import near, shown
 from birthsim_env.vector_env import BirthSIMVectorEnv
 

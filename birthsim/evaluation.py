@@ -23,6 +23,8 @@ def run(settings: Settings) -> None:
     rig = load_parameters(settings.parameters)
     if not (settings.env.startswith("BirthSIM/") and settings.env in gymnasium.registry):  # one with a law inside may be
         check_environment(settings.env)
+    # Processes that work beside this one find an id with a controller inside by the package that registers it.
+    environment = f"agents:{settings.env}" if "Residual" in settings.env else settings.env
     names = settings.controller
     if "residual" in names and settings.policy is None:
         settings.policy = policy_of(settings.env)
@@ -35,7 +37,7 @@ def run(settings: Settings) -> None:
         "sensors": settings.sensors, "randomize": RANDOMIZE[settings.randomize], **settings.parts(),
     }  # fmt: skip
     span = settings.episodes, settings.seed
-    pieces = {name: evaluation_tasks(name, controller_settings(name, rig), settings.env, world, *span) for name in names}
+    pieces = {name: evaluation_tasks(name, controller_settings(name, rig), environment, world, *span) for name in names}
     check_world(settings.env, parameters=rig, **world)  # which compiles: names are looked at before
     known = len(pieces)
     if policies:
@@ -47,7 +49,7 @@ def run(settings: Settings) -> None:
         own = {
             "controller": "residual", "source": file_hash(str(place / WEIGHTS)), "rig": rig.to_dict(), "policy": str(place),
         }  # fmt: skip
-        pieces[name] = evaluation_tasks(name, own, settings.env, world, *span, work=evaluate_learned)
+        pieces[name] = evaluation_tasks(name, own, environment, world, *span, work=evaluate_learned)
     folder, drawn = make_folder(settings.out), described(rig, world["randomize"], world["sensors"])
     print(drawn)
     if learned_with - {settings.sensors}:

@@ -9,7 +9,7 @@ import gymnasium as gym
 import torch
 from torch import nn
 
-import birthsim_env as birthsim_env
+import agents as agents  # registers ids with a controller inside
 
 given = dict(enumerate(sys.argv))
 device, environment = given.get(1, "cuda"), given.get(2, "BirthSIM/CircleResidual-v1")

@@ -7,6 +7,8 @@ import shutil
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 
+from birthsim.shadows import MEND, shadows
+
 ABOUT = {
     "agents": "policies: train, explain, residual", "live": "the page: live", "onnx": "export --to onnx",
     "build": "export --to wasm, c, fmu", "log": "export --to parquet, mcap", "tune": "tune", "video": "films of episodes",
@@ -42,6 +44,8 @@ def main(_: Settings) -> None:
     )
     print(f"{'browser':12}{next(filter(None, map(shutil.which, BROWSERS)), 'none found; mend: any browser shows the page')}")
     print(f"{'GPU':12}{graphics()}")
+    for name, place in shadows().items():
+        print(f"{name:12}another package hides BirthSIM's: {place}; mend: {MEND}")
     print("\nextras")
     for extra, missing in extras().items():
         mend = installation(extra)

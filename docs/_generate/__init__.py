@@ -18,6 +18,7 @@ from _generate.root_pages import PAGES, root_page
 from _generate.stages import stage
 
 PARTS = {
+    "api_birthsim.md": partial(api, "birthsim"),
     "api_birthsim_env.md": partial(api, "birthsim_env"),
     "api_baselines.md": partial(api, "baselines"),
     "api_agents.md": partial(api, "agents"),

@@ -7,9 +7,11 @@ import re
 import textwrap
 from importlib import import_module
 
+from _generate import docstrings
 from _generate.sentences import first_sentence
 
 BEYOND = {
+    "birthsim": (),
     "birthsim_env": (
         "env.BirthSIMEnv",
         "vector_env.BirthSIMVectorEnv",
@@ -108,6 +110,8 @@ def _text(thing: object) -> str:
     """The docstring as Markdown: its headings become bold lines, since a page has one order of headings."""
     if dataclasses.is_dataclass(thing) and (thing.__doc__ or "").startswith(f"{getattr(thing, '__name__', '')}("):
         return ""
+    if docstrings.read(thing).sections:
+        return docstrings.markdown(thing)
     text, _, listed = (inspect.getdoc(thing) or "").partition("\nArguments:\n")
     if listed:
         # A block of arguments becomes a list; what stands further in belongs to the argument above it.

@@ -19,7 +19,7 @@ from typing import Any, Self
 import numpy as np
 
 import birthsim_env
-from birthsim_env.learned import from_agents
+from agents.residual.settings import LAWS
 from lab.studies.speed import stopwatch
 
 ROUNDS = 3
@@ -164,7 +164,7 @@ def first_steps() -> Iterator[tuple[str, float]]:
     All processes share a folder for machine code, which is empty at the beginning: each compiles what those before it have not.
     """
     kinds: dict[str, dict[str, Any]] = {"valve mode": {"environment": CIRCLE}}
-    for law in from_agents("agents.residual.settings").LAWS:
+    for law in LAWS:
         kinds[f"{law} inside, lab sensors"] = {"environment": RESIDUAL, "law": law, "sensors": "lab"}
     with tempfile.TemporaryDirectory() as folder:
         for state in ("compiled", "cached"):

@@ -15,6 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+import agents as agents  # registers ids with a controller inside
 import birthsim_env
 
 CLOCKS = {"cpu": time.process_time, "wall": time.perf_counter}

@@ -16,7 +16,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-import birthsim_env  # noqa: F401  registers the ids
+import agents as agents  # registers ids with a controller inside
 from birthsim_build.device.machine import machine_named
 from lab.studies.tables import markdown
 
