@@ -1,4 +1,4 @@
-"""Every registered reader of tables: its ending is known wherever files are read, and what it cannot read is refused plainly."""
+"""Every registered reader of tables: its ending is known, and what it cannot read is refused plainly."""
 
 import sys
 from pathlib import Path
@@ -49,6 +49,6 @@ def test_a_reader_whose_extra_is_missing_names_it(reader, tmp_path, monkeypatch)
 
 
 def test_an_unknown_ending_is_refused_with_those_that_there_are(tmp_path):
-    with pytest.raises(ValueError, match="table = .*allowed: a file that ends in") as caught:
+    with pytest.raises(ValueError, match=r"table = .*allowed: a file that ends in") as caught:
         read_table("table", tmp_path / "own.docx")
     assert [one.name for one in entries("reader") if one.name not in str(caught.value)] == []
