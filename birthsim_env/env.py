@@ -89,10 +89,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Arguments
     - `action_mode`, `valves`: see above.
-    - `sensors`: `"ideal"`; `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, low-passed differences for
-      a velocity, noisy pressures;
-      `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
-      (`birthsim_env.physics.electronics`).
+    - `sensors`: the sensor model, whose figures are those of `birthsim_env.physics.electronics`:
+      {sensors}
     - `force_sensor`: `False` for a rig without one. The measured force of the hand is then zero, and every entry of the
       observation is computed with that.
     - `randomize`: what every episode draws anew. `False`: nothing. `"plant"`: the rig, from ranges about the one described
@@ -102,9 +100,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
     - `user_force`: the hand, instead of the scenario's. A `UserForce`; a function of time, or of time, position and velocity,
-      that returns (Fx, Fy) in N; a CSV file of time, Fx, Fy; or `"file.py:Name"`. Or the name of a hand of the package:
-      `"steps"`, or one that never stops moving: `"sine"`, `"noise"` and `"guided"`. The guided hand has mass, damper and
-      spring, and holds the end effector.
+      that returns (Fx, Fy) in N; a CSV file of time, Fx, Fy; or `"file.py:Name"`. Or the name of a hand:
+      {hands}
     - `stiffness`: a number (N/m), a `StiffnessSchedule` of your own, or a CSV file of time, x, y, stiffness (N/m), which
       `reference` takes too. A CSV file's heading names its columns; `"file.csv:t,a,b"` says how others are called. Times are
       s since the episode begins. Between its rows a reference is smooth and stays between them, a force is linear.
@@ -198,7 +195,26 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 def _row_of(scenario: Entry) -> str:
     """A scenario's row in the table of ids."""
     made: Scenario = scenario.made()
-    return f"    | `{environment_id(scenario.name)}` | {made.experiment} | {made.duration:g} |"
+    return f"| `{environment_id(scenario.name)}` | {made.experiment} | {made.duration:g} |"
 
 
-BirthSIMEnv.__doc__ = (BirthSIMEnv.__doc__ or "").replace("    {scenarios}", "\n".join(map(_row_of, entries("scenario"))))
+def _said_of(choice: Entry) -> str:
+    """A line of the choices of an argument."""
+    return f'- `"{choice.name}"`: {choice.about}'
+
+
+def _with_lists(docstring: str) -> str:
+    """A docstring with what is registered in the places that are named for it, in braces."""
+    for place, kind, line in (
+        ("scenarios", "scenario", _row_of),
+        ("sensors", "sensors", _said_of),
+        ("hands", "hand", _said_of),
+    ):
+        before, _, after = docstring.partition(f"{{{place}}}")
+        indent = before.rpartition("\n")[2]
+        docstring = before + f"\n{indent}".join(map(line, entries(kind))) + after
+    return docstring
+
+
+if BirthSIMEnv.__doc__:  # Python may run without
+    BirthSIMEnv.__doc__ = _with_lists(BirthSIMEnv.__doc__)

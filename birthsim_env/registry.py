@@ -34,7 +34,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "scenario": ("birthsim_env.parts.scenarios",),
     "hand": ("birthsim_env.parts.hands",),
     "policy": ("agents.policy.shipped",),
-    "reader": ("birthsim_env.tables",),
+    "reader": ("birthsim_env.tables.readers",),
     "export": ("birthsim.exports",),
     "device": ("birthsim_env.episodes", "birthsim_build.device.episodes"),
     "study": ("lab.studies",),

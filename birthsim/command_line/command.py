@@ -14,7 +14,7 @@ from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Dict
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
-from birthsim.command_line.settings import CONTROLLER, ENV, HAND, SENSORS, Configured
+from birthsim.command_line.settings import CONTROLLER, ENV, HAND, SENSORS, TABLE, Configured
 from birthsim.command_line.start import endings
 
 S = TypeVar("S")
@@ -74,7 +74,7 @@ def perform_with(name: str, settings: type[S], action: Callable[[S], None], exam
 def _named(settings: type) -> str:
     """What has a name and a command of these settings takes, for the end of its help; "" where it takes nothing of the kind."""
     marks = [mark for hint in get_type_hints(settings, include_extras=True).values() for mark in _marks(hint)]
-    if not any(mark in marks for mark in (CONTROLLER, ENV, SENSORS, HAND)):
+    if not any(mark in marks for mark in (CONTROLLER, ENV, SENSORS, HAND, TABLE)):
         return ""
     from birthsim_env.parts.scenarios import environment_id  # these load what is listed
     from birthsim_env.registry import names
@@ -85,6 +85,7 @@ def _named(settings: type) -> str:
         (ENV, "environments", lambda: [environment_id(name) for name in names("scenario")]),
         (SENSORS, "sensors", lambda: names("sensors")),
         (HAND, "hands", lambda: names("hand")),
+        (TABLE, "endings of tables", lambda: names("reader")),
     ]
     paragraphs = [f"{title}: {', '.join(found())}" for mark, title, found in lists if mark in marks]
     return "\n".join(textwrap.fill(one, 80, break_on_hyphens=False) for one in paragraphs) + "\n\n"

@@ -88,6 +88,7 @@ MANY = Parameter(consume_multiple=True)
 """An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
 HAND = Parameter(group=WORLD, metavar="PART")
+TABLE = Parameter(metavar="TABLE")
 NAMES = "the controllers below, with options as in 'admittance[learn=false]', or path/to/file.py:Class."
 """Help of an option that names controllers."""
 Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]

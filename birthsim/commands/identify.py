@@ -17,7 +17,7 @@ from baselines.identification.log_columns import LogOptions
 from baselines.identification.log_file import read_trial, write_trial
 from baselines.logs.writing import WRITERS
 from baselines.registry import make_controller
-from birthsim.command_line.settings import CONTROLLER, SENSORS, Configured, RigFile, Seed, number, whole
+from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Configured, RigFile, Seed, number, whole
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
@@ -34,8 +34,8 @@ class Settings(Configured):
     TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.
     """
 
-    log: Annotated[Path | None, Parameter(metavar="FILE")] = field(default=None, kw_only=False)
-    """.csv, .parquet, .mcap or .mat: time, openings, pressures, positions, forces."""
+    log: Annotated[Path | None, TABLE] = field(default=None, kw_only=False)
+    """A table of time, openings, pressures, positions, forces; the endings below."""
     columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
     """What columns of the log are called, such as force_x=Fz,force_y=none."""
     skip: Annotated[int | None, whole(0)] = None

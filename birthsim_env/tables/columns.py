@@ -13,19 +13,21 @@ import numpy as np
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.reading import named
 from birthsim_env.physics.rig.values import in_line
-from birthsim_env.tables.reading import READERS, read_table
+from birthsim_env.registry import names
+from birthsim_env.tables.reading import read_table
 from birthsim_env.tables.selection import Selection, clock_note, mapping_of
 from birthsim_env.tables.table import Reading, Table
 
 LARGEST = 64 * 2**20
 """Bytes of a file; an hour at 1 kHz takes them."""
 
-_FILE = re.compile(rf"(.+?(?:{'|'.join(map(re.escape, READERS))}))(?::(.*))?", re.IGNORECASE | re.DOTALL)
-
 
 def table_file(value: Any) -> tuple[Path, str] | None:
     """``file.csv`` or ``file.csv:t,a,b`` as a path and the names of columns; None for what is no file of a table."""
-    found = _FILE.fullmatch(os.fsdecode(value)) if isinstance(value, (str, os.PathLike)) else None
+    if not isinstance(value, (str, os.PathLike)):
+        return None
+    endings = "|".join(map(re.escape, names("reader")))
+    found = re.fullmatch(rf"(.+?(?:{endings}))(?::(.*))?", os.fsdecode(value), re.IGNORECASE | re.DOTALL)
     return None if found is None else (Path(found[1]), found[2] or "")
 
 

@@ -13,6 +13,7 @@ from _generate.environments import environments
 from _generate.metrics import metrics
 from _generate.page import page
 from _generate.pictures import pictures
+from _generate.readers import readers
 from _generate.rig import rig
 from _generate.root_pages import PAGES, root_page
 from _generate.stages import stage
@@ -27,6 +28,7 @@ PARTS = {
     "environments.md": environments,
     "metrics.md": metrics,
     "page.md": page,
+    "readers.md": readers,
     "rig.md": rig,
     **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},
 }

@@ -10,7 +10,8 @@ from birthsim_env import observation, reward
 from birthsim_env.assembly import DEFAULTS
 from birthsim_env.info import FIELDS
 from birthsim_env.parts.scenarios import environment_id, find_scenario
-from birthsim_env.registry import entry, names
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import Entry, entries, entry, names
 
 
 def environments() -> str:
@@ -54,6 +55,22 @@ def _shared() -> str:
             "|---|---|---|",
             *rows,
             "",
+            "### Sensors",
+            "",
+            "Errors have the sizes that `electronics` of the rig has ([all of them](rig.md)).",
+            "",
+            "| `sensors` | what they show | looks | `randomize` draws its errors | a board before the valves |",
+            "|---|---|---|---|---|",
+            *map(_sensor_row, entries("sensors")),
+            "",
+            "### Hands",
+            "",
+            "Instead of the scenario's, `user_force` takes one by its name.",
+            "",
+            "| `user_force` | what it does | feels where the head is |",
+            "|---|---|---|",
+            *map(_hand_row, entries("hand")),
+            "",
             "### Reward",
             "",
             terms,
@@ -73,6 +90,20 @@ def _shared() -> str:
             "| `is_success` | 1 | settled error below 1 mm so far, and not terminated |",
         ]
     )
+
+
+def _sensor_row(model: Entry) -> str:
+    made = model.made(Parameters().electronics, 1)
+    looks = "every control period" if made.sampled else "when it is asked"
+    return f"| `{model.name}` | {model.about} | {looks} | {_yes(made.drawn)} | {_yes(made.has_board)} |"
+
+
+def _hand_row(hand: Entry) -> str:
+    return f"| `{hand.name}` | {hand.about} | {_yes(hand.made.closed_loop)} |"
+
+
+def _yes(said: object) -> str:
+    return "yes" if said else "no"
 
 
 def _section(scenario: str) -> str:

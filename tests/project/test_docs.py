@@ -14,6 +14,7 @@ from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
 from birthsim.main import COMMANDS
 from birthsim_env import Parameters
+from birthsim_env.registry import names
 from lab.studies.comparison import tables as comparison_tables
 from lab.studies.scores import tables as score_tables
 from tests.console import ROOT
@@ -79,8 +80,12 @@ def test_generated_parts_know_everything(parts):
     commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
     ids = [name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name]
     fields = [name for section in Parameters().to_dict().values() for name in section]
-    for part, names in (("commands.md", commands), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)):
-        assert [name for name in names if f"`{name}`" not in parts[part]] == [], part
+    named = [*ids, *names("sensors"), *names("hand")]
+    for part, known in (
+        *(("commands.md", commands), ("environments.md", named), ("metrics.md", UNITS), ("rig.md", fields)),
+        ("readers.md", names("reader")),
+    ):
+        assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
 
 
 def test_pages_of_the_code_spell_out_arguments_and_defaults(parts):

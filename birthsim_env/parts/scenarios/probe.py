@@ -12,7 +12,7 @@ REST = 3.0
 
 @register(scenario="probe", about="The head stands still and gives way to whoever pulls it.", order=2)
 class Probe(Scenario):
-    """FixedTarget still and, after 3 s, be pushed: the stiffness test."""
+    """Hold still and, after 3 s, be pushed: the stiffness test."""
 
     title = "Stiffness test: hold and be pushed"
     duration = 7.0

@@ -6,12 +6,17 @@ from array import array
 import numpy as np
 
 from birthsim_env.physics.rig.values import in_line, problem, shown
+from birthsim_env.registry import register
 from birthsim_env.tables.cells import Cells, is_missing, is_number, why
 from birthsim_env.tables.encoding import encoding_and_note, lines_of
 from birthsim_env.tables.layout import Layout, is_remark, layout_of, split, trimmed
 from birthsim_env.tables.table import Raw, Reading, Table, table_of
 
 
+@register(reader=".csv", about="Text: cells between commas, semicolons, tabs, bars or blanks.", order=1)
+@register(reader=".tsv", about="Text, as .csv.", order=5)
+@register(reader=".txt", about="Text, as .csv.", order=6)
+@register(reader=".lvm", about="Text with LabVIEW's block before it, as .csv.", order=7)
 def read_text_file(source: str, content: bytes, how: Reading) -> Table:
     """The table of a file of text; ``ValueError`` names the file, the line and what is allowed."""
     if not content.strip(b"\0 \r\n\t\xef\xbb\xbf\xff\xfe"):

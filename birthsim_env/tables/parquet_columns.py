@@ -1,4 +1,4 @@
-"""Tables in Parquet files: numbers, decimals, texts that are numbers, instants and durations."""
+"""Columns of Parquet files: numbers, decimals, texts that are numbers, instants and durations."""
 
 from typing import Any
 
@@ -9,14 +9,14 @@ import pyarrow.parquet as pq
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import problem, shown
 from birthsim_env.tables.cells import Cells
-from birthsim_env.tables.table import LONGEST, Raw, Reading, Table, table_of
+from birthsim_env.tables.table import LONGEST, Raw, Reading
 
 BATCH = 2**16
 """Rows that are unpacked at a time."""
 
 
-def read_parquet(source: str, content: bytes, how: Reading) -> Table:
-    """The table of a Parquet file; a field's metadata may have its ``unit``, and fields of a structure are columns."""
+def parquet_columns(source: str, content: bytes, how: Reading) -> list[Raw]:
+    """The columns of a Parquet file; a field's metadata may have its ``unit``, and fields of a structure are columns."""
     try:
         about = pq.ParquetFile(pa.BufferReader(content))
         texts = [field.name for field in about.schema_arrow if _is_text(field.type)]
@@ -24,10 +24,9 @@ def read_parquet(source: str, content: bytes, how: Reading) -> Table:
         file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=texts)
         count = file.metadata.num_rows
         how.check_size(source, count * len(file.schema_arrow))
-        raw = [one for field in file.schema_arrow for one in _columns(file, field, count, how)]
+        return [one for field in file.schema_arrow for one in _columns(file, field, count, how)]
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{source} is no Parquet ({problem(error)}); allowed: what pandas or Polars writes") from error
-    return table_of(source, raw)
 
 
 def _columns(file: Any, field: Any, count: int, how: Reading) -> list[Raw]:

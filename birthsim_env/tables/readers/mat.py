@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.physics.rig.values import in_line, problem, shown
+from birthsim_env.registry import register
 from birthsim_env.tables.cells import Cells
 from birthsim_env.tables.mat_arrays import Foreign, variables_of
 from birthsim_env.tables.table import Raw, Reading, Table, table_of
@@ -18,6 +19,7 @@ DEPTH = 5
 NEWER = "is a MATLAB 7.3 file (HDF5), which is not read; allowed: one of save(..., '-v7')"
 
 
+@register(reader=".mat", about="MATLAB up to version 7: vectors, structures, signals of Simulink and dSPACE.", order=4)
 def read_mat(source: str, content: bytes, how: Reading) -> Table:
     """The table of a MATLAB file; a vector of another length than most is no column."""
     if content.startswith(b"MATLAB 7.3") or b"\x89HDF" in content[:1024]:

@@ -8,18 +8,21 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.physics.rig.values import in_line, problem, shown
+from birthsim_env.registry import register
 from birthsim_env.tables.cells import Cells
 from birthsim_env.tables.headings import concept, name_and_unit
-from birthsim_env.tables.mcap_messages import json_messages
 from birthsim_env.tables.table import LONGEST, Raw, Reading, Table, table_of
 
 DEPTH = 4
 """Levels of objects in a message that are taken as columns: ``force.x``."""
 
 
+@register(reader=".mcap", about="MCAP: the channel of JSON messages that fits best.", needs={"extra log"}, order=3)
 def read_mcap(source: str, content: bytes, how: Reading) -> Table:
     """The table of an MCAP file: of its channels of JSON messages the one with the most known columns, or else with the most
     messages. A message's ``log_time`` is its time unless one of them has a time in it."""
+    from birthsim_env.tables.mcap_messages import json_messages  # needs the extra
+
     topics: dict[str, _Topic] = {}
     foreign = set[str]()
     size = _Size(source, how)
