@@ -68,7 +68,7 @@ def power(base: Any, exponent: int) -> Any:
 class _Powers(ast.NodeTransformer):
     """Writes ``power(base, 3)`` for ``base**3``."""
 
-    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:  # noqa: N802  its name in ``ast``
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
         whole = isinstance(node.right, ast.Constant) and isinstance(node.right.value, int)
         if not (whole and isinstance(node.op, ast.Pow)):
