@@ -18,7 +18,7 @@ import numpy as np
 
 import birthsim_env  # noqa: F401  registers the ids
 from birthsim_build.device.machine import machine_named
-from lab.studies.tables import markdown
+from lab.engine.tables import markdown
 
 LOOPS: dict[str, tuple[str, dict[str, Any]]] = {
     "Circle, ideal": ("BirthSIM/Circle-v1", {}),
