@@ -13,10 +13,10 @@ from typing import Annotated
 
 import gymnasium
 import numpy as np
-from birthsim.command_line.settings import MANY, Configured, Sensors, whole
 
 from baselines.registry import make_controller
 from baselines.staged import StagedController
+from birthsim.command_line.settings import MANY, Configured, Sensors, whole
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import Mask, Measurement
 from birthsim_env.physics.compiled.lanes import Array
