@@ -12,6 +12,7 @@
 # make scratch trains PPO from scratch
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
+# make devcontainer writes .devcontainer/, where VS Code and Codespaces look, from packaging/container
 # make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -52,7 +53,7 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links golden clean
+.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links devcontainer golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml packaging/requirements/base.txt
@@ -256,6 +257,11 @@ docs: $(READY) $(NPM)/.ready
 
 docs-links: $(READY)
 	$(BIN)/python -m sphinx --builder linkcheck --define nb_execution_mode=off docs $(OUT)/docs-links
+
+# The same file, with paths as they are from there; git ignores it.
+devcontainer:
+	mkdir -p .devcontainer
+	sed -e 's|"Containerfile"|"../packaging/container/Containerfile"|' -e 's|"../.."|".."|' packaging/container/devcontainer.json > .devcontainer/devcontainer.json
 
 # Interrupted, the same command carries on.
 soak: $(READY)

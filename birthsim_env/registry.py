@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
+from importlib.abc import InspectLoader
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -191,7 +192,7 @@ def _enter(kind: str) -> None:
         _ENTERED.add(kind)
         try:
             for room in ROOMS[kind]:
-                _enter_room(room)
+                _enter_room(room, kind)
         except BaseException:
             _ENTERED.discard(kind)
             raise
@@ -205,8 +206,8 @@ def _enter(kind: str) -> None:
                     warnings.warn(f"plugin {point.name!r} is left out: {problem(error)}", stacklevel=4)
 
 
-def _enter_room(room: str) -> None:
-    """Import a room's modules, where it is installed and no package of another owner stands in its place."""
+def _enter_room(room: str, kind: str) -> None:
+    """Import what registers in a room, where that is installed and no package of another owner is in its place."""
     top = room.partition(".")[0]
     found = find_spec(top)
     places = [] if found is None else [Path(one) for one in found.submodule_search_locations or ()]
@@ -216,7 +217,10 @@ def _enter_room(room: str) -> None:
         return
     package = import_module(room)
     for module in pkgutil.walk_packages(getattr(package, "__path__", []), f"{room}."):
-        import_module(module.name)
+        spec = find_spec(module.name)
+        text = spec.loader.get_source(module.name) if spec is not None and isinstance(spec.loader, InspectLoader) else None
+        if text is not None and "register(" in text and f"{kind}=" in text:
+            import_module(module.name)
 
 
 @contextmanager

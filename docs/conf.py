@@ -123,7 +123,7 @@ def with_notebook(app, page, template, context, doctree):
 def build_notebooks(app, exception):
     """The tutorials as files, beside the pages."""
     if exception is None and app.builder.name == "html":
-        notebooks.write(app.outdir / "notebooks")
+        notebooks.write(app.outdir)
 
 
 def build_words(app, exception):

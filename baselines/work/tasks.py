@@ -3,26 +3,32 @@
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from tqdm import tqdm
 
 import birthsim_env
+from baselines.work.asked import asked, note
+from baselines.work.calls import called_by
+from baselines.work.definitions import take_stock
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.endings import later_signals
 from birthsim_env.files import finite, write_json
-from birthsim_env.physics.compiled.sources import hashes
 from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Each
 
 Result = dict[str, Any]
 
 MOST = 2**28
 """Bytes of a piece; those with a trace of 64 episodes have a few million."""
+
+_PIECE = {"code": dict, "used": Each(str), "result": dict, "sha256": str}
 
 
 @dataclass(frozen=True)
@@ -38,21 +44,19 @@ class Task:
     settings: dict[str, Any]
     keeps: bool = False
 
-    def code(self) -> dict[str, str]:
-        """The ``code_stamp`` of what it runs."""
-        return code_stamp(getattr(self.work, "func", self.work).__module__)
-
     def file(self) -> str:
-        """Its file's name: the task's and a hash of code and settings, so that other code or settings have another file."""
-        return f"{self.name}-{_digest([self.code(), self.settings])[:16]}.json"
+        """Its file's name: the task's and a hash of its settings, so that other settings have another file."""
+        return f"{self.name}-{_digest(self.settings)[:16]}.json"
+
+
+def code_stamp(work: Callable[..., Any], used: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:
+    """What computes: the package's version, a hash of all that ``work`` and the entries ``used`` call, and its libraries."""
+    return {"version": birthsim_env.__version__, "called": _digest(called_by([work], used)), **_libraries()}
 
 
 @cache
-def code_stamp(module: str) -> dict[str, str]:
-    """What computes: the package's version, a hash of the sources that ``module`` imports, and what they compute with."""
-    libraries = {name: version(name) for name in ("numpy", "numba", "scipy")}
-    own = {"version": birthsim_env.__version__, "sources": _digest(hashes(module)), "python": platform.python_version()}
-    return own | libraries
+def _libraries() -> dict[str, str]:
+    return {"python": platform.python_version(), **{name: version(name) for name in ("numpy", "numba", "scipy")}}
 
 
 def run_tasks(
@@ -64,22 +68,23 @@ def run_tasks(
     ``jobs`` processes work side by side, or those of a ``cluster``, as ``side_by_side`` says; the caller has the folder to
     itself, by ``own_folder``. An interrupt keeps the complete pieces.
     """
+    take_stock()
     paths = {task.name: folder / task.file() for task in tasks}
-    results = {name: result for name, path in paths.items() if (result := _read(path)) is not None}
+    results = {task.name: result for task in tasks if (result := _read(paths[task.name], task)) is not None}
     missing = [task for task in tasks if task.name not in results]
     failures: dict[str, str] = {}
     if results:
         print(f"{title}: {len(results)} of {len(tasks)} are there with these settings, rig and code, and are kept")
     with tqdm(total=len(tasks), initial=len(results), desc=title, unit=" pieces", disable=not missing) as bar:
 
-        def take(number: int, outcome: Result | str) -> None:
+        def take(number: int, outcome: tuple[Result, dict[str, str]] | str) -> None:
             task = missing[number]
-            if isinstance(outcome, dict):
+            if isinstance(outcome, tuple):
                 # A signal in between would leave a file that the last line does not count.
                 with later_signals():
-                    _write(paths[task.name], task, outcome)
+                    _write(paths[task.name], task, *outcome)
                     # As it would be read: one run gives the same as an interrupted one.
-                    results[task.name] = _read(paths[task.name]) or {}
+                    results[task.name] = _read(paths[task.name], task) or {}
             else:
                 failures[task.name] = outcome
             bar.update()
@@ -95,35 +100,45 @@ def run_tasks(
 
 def result_of(task: Task, folder: Path) -> Result:
     """The result of one task: from ``folder`` where that holds it, else worked out here, and then written there."""
+    take_stock()
     path = folder / task.file()
-    if _read(path) is None:
-        _write(path, task, task.work(**task.settings))
-    return _read(path) or {}
+    if _read(path, task) is None:
+        _write(path, task, task.work(**task.settings), asked())
+    return _read(path, task) or {}
 
 
-def _write(path: Path, task: Task, result: Result) -> None:
-    content = finite({"code": task.code(), "settings": task.settings, "result": result})
+def is_kept(task: Task, folder: Path) -> bool:
+    """Whether ``folder`` holds the result of a task, of these settings and this code."""
+    return _read(folder / task.file(), task) is not None
+
+
+def _write(path: Path, task: Task, result: Result, used: Mapping[str, str]) -> None:
+    content = finite({"settings": task.settings, "result": result})
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_json(path, {**content, "sha256": _digest(content["result"])})
+    made = {"code": code_stamp(task.work, used), "used": dict(used)}
+    write_json(path, {**made, **content, "sha256": _digest([made["used"], content["result"]])})
 
 
-def _read(path: Path) -> Result | None:
-    """The result in a file; None where there is none, and where it is not as it was written."""
+def _read(path: Path, task: Task) -> Result | None:
+    """The result in a file; None where there is none, where it is not as it was written, and where other code made it."""
     try:
-        content = read_json("piece", path, {"result": dict, "sha256": str}, MOST)
+        content = read_json("piece", path, _PIECE, MOST)
     except ValueError:
         return None
     result: Result = content["result"]
-    return result if content["sha256"] == _digest(result) else None
+    if content["sha256"] != _digest([content["used"], result]) or content["code"] != code_stamp(task.work, content["used"]):
+        return None
+    note(content["used"])
+    return result
 
 
 def _digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _attempt(task: Task, place: Path) -> Result | str:
-    """The result, or what went wrong in words: one controller that fails must not cost the others' results."""
+def _attempt(task: Task, place: Path) -> tuple[Result, dict[str, str]] | str:
+    """The result and the entries asked for, or what went wrong in words: one that fails must not cost the others' results."""
     try:
-        return task.work(**task.settings, **({"place": str(place)} if task.keeps else {}))
+        return task.work(**task.settings, **({"place": str(place)} if task.keeps else {})), asked()
     except Exception as error:
         return f"{type(error).__name__}: {error}"

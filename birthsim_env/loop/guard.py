@@ -71,7 +71,7 @@ ON_FAULT = {"hold": 0.0, "vent": -1.0}
 FAULT_TIME = 0.03
 """s, by default: 95 of 100 heads stray by some 5 mm at most.
 
-Measured by ``python -m lab.studies.missing_samples --lanes 32``."""
+Measured by ``birthsim study missing-samples --lanes 32``."""
 
 STIFFNESS, PNEUMATIC = 2000.0, (3600.0, 1800.0)
 """N/m; assumed: what is asked for until something good is."""

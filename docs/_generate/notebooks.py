@@ -2,16 +2,19 @@
 
 import os
 import re
+import shutil
 from pathlib import Path
 from urllib.parse import quote
 
 import jupytext
 from nbformat.v4 import new_code_cell
 
-TUTORIALS = Path(__file__).resolve().parent.parent / "tutorials"
+ROOT = Path(__file__).resolve().parents[2]
+TUTORIALS = ROOT / "docs" / "tutorials"
 NAMES = sorted(path.stem for path in TUTORIALS.glob("*.md") if "{code-cell}" in path.read_text(encoding="utf-8"))
 BRANCH = "gh-pages"
-"""Of the repository, where the site is published: Colab opens notebooks of a repository only."""
+"""Of the repository, where the site is published: Colab opens notebooks of a repository only, and Binder reads ``binder/`` at
+the root of what it opens, which the clone has in ``packaging/``."""
 
 INSTALLS = """# Installs BirthSIM where it is absent.
 import importlib.util
@@ -46,11 +49,18 @@ def notebook(name: str) -> str:
     return jupytext.writes(document, fmt="ipynb")
 
 
-def write(folder: Path) -> None:
-    """Write all of them into a folder."""
+def write(site: Path) -> None:
+    """Write all of them below a site, and with a repository what Binder installs for them."""
+    folder = site / "notebooks"
     folder.mkdir(parents=True, exist_ok=True)
     for name in NAMES:
         (folder / f"{name}.ipynb").write_text(notebook(name), encoding="utf-8")
+    if where := repository():
+        binder = site / "binder"
+        shutil.copytree(ROOT / "packaging" / "binder", binder, dirs_exist_ok=True)
+        shutil.copy(ROOT / "constraints.txt", binder)
+        wanted = binder / "requirements.txt"
+        wanted.write_text(wanted.read_text(encoding="utf-8").replace("OWNER/NAME", where), encoding="utf-8")
 
 
 def links(name: str) -> str:
@@ -59,6 +69,6 @@ def links(name: str) -> str:
     if where := repository():
         found["Open in Colab"] = f"https://colab.research.google.com/github/{where}/blob/{BRANCH}/notebooks/{name}.ipynb"
         found["Open in Binder"] = (
-            f"https://mybinder.org/v2/gh/{where}/HEAD?labpath={quote(f'docs/tutorials/{name}.ipynb', safe='')}"
+            f"https://mybinder.org/v2/gh/{where}/{BRANCH}?labpath={quote(f'notebooks/{name}.ipynb', safe='')}"
         )
     return f'<p class="notebook">{" · ".join(f"""<a href="{address}">{words}</a>""" for words, address in found.items())}</p>\n'

@@ -5,9 +5,10 @@ from typing import Any
 from baselines.work.tasks import Result, Task
 from birthsim.commands.figure4 import metrics_of, record_run
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.results import Content
-from lab.studies.study import Options, Study
-from lab.studies.tables import markdown
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Options, Study
+from lab.engine.tables import markdown
 
 
 def measure(controller: str) -> Result:
@@ -29,11 +30,9 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,),
     {"controller": ("backstepping",)},
     _tasks,
-    lambda _, found: dict(found),
-    {},
-    _shown,
+    show=_shown,
     words={"controller": "registered names"},
 )
+register(study="figure4", about="errors in the experiment of the paper's Fig. 4")(STUDY)

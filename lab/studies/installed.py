@@ -15,9 +15,10 @@ from urllib.request import urlopen
 
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
-from lab.studies.results import Content
-from lab.studies.study import Study
-from lab.studies.tables import markdown
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Options, Study, the_only_one
+from lab.engine.tables import markdown
 
 LONGEST = 3600.0
 """s that a command may take; assumed."""
@@ -84,6 +85,10 @@ def trial(extras: str) -> Result:
     return {"rows": rows}
 
 
+def _tasks(options: Options) -> dict[Any, Task]:
+    return {"": Task("installed", trial, {"extras": options.extras})}
+
+
 def _shown(content: Content) -> dict[str, str]:
     rows = [["command", "s", "outcome"]]
     for command, (seconds, status) in content["figures"]["rows"].items():
@@ -92,12 +97,12 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,),
     {"extras": "agents,live,build"},
-    lambda options: {"": Task("installed", trial, {"extras": options.extras})},
-    lambda _, found: found[""],
+    _tasks,
+    the_only_one,
     {"rows": "s, exit status"},
     _shown,
     timed=True,
     words={"extras": "of the installation"},
 )
+register(study="installed", about="README's commands, from the wheel alone in an empty home")(STUDY)

@@ -26,9 +26,9 @@ from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each, Listed
 from birthsim_env.physics.rig.values import in_line, shown
-from birthsim_env.registry import names
-from lab.studies.tables import markdown
-from lab.studies.worlds import worlds
+from birthsim_env.registry import names, register
+from lab.engine.tables import markdown
+from lab.engine.worlds import worlds
 
 ENTRIES, TABLE = ROOT / "lab" / "leaderboard", ROOT / "docs" / "data" / "leaderboard.md"
 RULES: dict[str, Any] = {"sensors": "lab", "randomize": "all", "episodes": 64, "seed": 80000}
@@ -53,6 +53,7 @@ class Settings(Configured):
     """Run every entry of leaderboard/ again, say which repeats in every bit, and write docs/data/leaderboard.md."""
 
 
+@register(study="leaderboard", about="whether entries of leaderboard/ repeat, bit for bit")
 def main(_: Settings) -> None:
     """Exit with 1 where an entry does not repeat; the table is written where all do."""
     problems = {path.stem: _problem(path) for path in entries()}

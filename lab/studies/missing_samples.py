@@ -1,4 +1,4 @@
-"""What a rig does while a sensor is silent: ``python -m lab.studies.missing_samples``.
+"""What a rig does while a sensor is silent: ``birthsim study missing-samples``.
 
 On circles of randomised rigs all samples of one signal are NaN for some time, from 1 s on. The
 table has the largest distance, mm, of the end effector from where it is with all samples, until 0.5 s after the outage: median
@@ -7,17 +7,20 @@ the table shows for how long the last good sample can stand in for the signal. B
 a ratio in one run.
 """
 
-import argparse
 import time
+from dataclasses import dataclass
+from typing import Annotated
 
 import gymnasium
 import numpy as np
 
 from baselines.registry import make_controller
 from baselines.staged import StagedController
+from birthsim.command_line.settings import MANY, Configured, Sensors, whole
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import Mask, Measurement
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.registry import register
 
 CONTROLLERS = ("backstepping-weight", "pid", "admittance-backstepping", "admittance-adaptive", "residual:circle_lab")
 OUTAGES = (0.001, 0.01, 0.03, 0.1, 0.3)
@@ -64,13 +67,19 @@ def cost(controller: str, lanes: int, calls: int = 3000) -> float:
     return taken["guarded"] / taken["bare"]
 
 
-def main() -> None:
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Print how far heads are from where they were with all samples, and what the guard of signals costs."""
+
+    lanes: Annotated[int, whole(1, 65536)] = 64
+    """Worlds of each outage."""
+    sensors: Annotated[tuple[Sensors, ...], MANY] = ("ideal", "lab")
+    controllers: Annotated[tuple[str, ...], MANY] = CONTROLLERS
+
+
+@register(study="missing-samples", about="what a rig does while a sensor is silent")
+def main(arguments: Settings) -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--lanes", type=int, default=64)
-    parser.add_argument("--sensors", nargs="+", default=["ideal", "lab"])
-    parser.add_argument("--controllers", nargs="+", default=list(CONTROLLERS))
-    arguments = parser.parse_args()
     print(f"{'controller':24} {'sensors':8} {'signal':11}", *(f"{1e3 * lasts:>16g} ms" for lasts in OUTAGES))
     for controller in arguments.controllers:
         for sensors in arguments.sensors:
@@ -88,7 +97,3 @@ def main() -> None:
                 print(f"{controller:24} {sensors:8} {signal:11}", *(f"{cell:>19}" for cell in cells), flush=True)
     for lanes in (1, 64):
         print(f"guard, {lanes} lanes:", {name: round(cost(name, lanes), 3) for name in arguments.controllers})
-
-
-if __name__ == "__main__":
-    main()

@@ -5,9 +5,10 @@ from typing import Any
 
 from baselines.work.side_by_side import side_by_side
 from baselines.work.tasks import Result, Task
-from lab.studies.results import Content
-from lab.studies.study import Options, Study
-from lab.studies.tables import markdown
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Options, Study, as_found
+from lab.engine.tables import markdown
 
 PIECES, LASTS = 200, 0.05
 """Pieces of a measurement, and s that each lasts."""
@@ -46,12 +47,12 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,),
     {"beside": ""},
     _tasks,
-    lambda _, found: dict(found),
+    as_found,
     {"start": "s", "empty": "s", "lasting": "s"},
     _shown,
     timed=True,
     words={"beside": "ray or ray:ADDRESS, measured beside joblib's processes"},
 )
+register(study="pools", about="what other processes and hosts cost")(STUDY)

@@ -12,9 +12,9 @@ from baselines.bench.evaluation import Evaluation
 from baselines.figures import style
 from baselines.figures.runs import episode_figure, error_over_time, figure4
 from baselines.figures.style import headline, legend_below, save
-from lab.studies.results import read_result
-from lab.studies.shelf import declared, names
-from lab.studies.study import no_pictures
+from lab.engine.results import read_result
+from lab.engine.shelf import declared, names
+from lab.engine.study import no_pictures
 from tests.figures import caught, contrast
 
 

@@ -1,5 +1,7 @@
 """Calls that are refused in one line beyond single values: shapes, what goes with what, what nothing can serve."""
 
+from runpy import run_path
+
 import gymnasium
 import numpy as np
 import pytest
@@ -20,7 +22,6 @@ from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
-from lab.studies.labour.model import Labour
 from lab.studies.lyapunov import LyapunovFunction
 from lab.studies.verification.strict_feedback import strict_feedback_rates
 
@@ -54,7 +55,11 @@ def reset(*fixed, make=gymnasium.make, seed=0, **given):
 
 env, started = later(gymnasium.make, CIRCLE), later(reset)
 lanes = later(reset, make=gymnasium.make_vec)
-paper, schedule, labour = later(BacksteppingController, RIG), later(StiffnessSchedule), later(Labour)
+paper, schedule, labour = (
+    later(BacksteppingController, RIG),
+    later(StiffnessSchedule),
+    later(run_path("examples/labour.py")["Labour"]),
+)
 residual, plant, stage = later(ResidualSettings), later(Plant), later(Stage, lambda *_: 0)
 
 

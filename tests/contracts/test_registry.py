@@ -67,7 +67,7 @@ def test_a_package_of_another_owner_is_no_room_and_is_named(rooms, monkeypatch, 
 
 
 def test_a_room_that_fails_says_so_every_time(rooms):
-    written(rooms / "hands", broken="raise RuntimeError('out of order')")
+    written(rooms / "hands", broken=f"raise RuntimeError('out of order')\n{one('push')}")
     for _ in range(2):
         with pytest.raises(RuntimeError, match="out of order"):
             names("hand")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics.compiled.sources import ROOT
+from lab.engine.results import commit
 from lab.studies.kills import checks
 from lab.studies.kills.report import read_outcomes, write_outcomes, write_page
 from lab.studies.kills.targets import TARGETS, Target
 from lab.studies.kills.tries import Course, Outcome
-from lab.studies.results import commit
 
 DOCS = ROOT / "docs"
 

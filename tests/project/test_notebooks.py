@@ -11,10 +11,9 @@ from tests.console import ROOT
 nbformat = pytest.importorskip("nbformat")
 pytest.importorskip("jupytext")
 
-BINDER = ROOT / "packaging" / "binder"
 ADDRESSES = (
     "../notebooks/{}.ipynb", "https://colab.research.google.com/github/someone/birthsim/blob/gh-pages/notebooks/{}.ipynb",
-    "https://mybinder.org/v2/gh/someone/birthsim/HEAD?labpath=docs%2Ftutorials%2F{}.ipynb",
+    "https://mybinder.org/v2/gh/someone/birthsim/gh-pages?labpath=notebooks%2F{}.ipynb",
 )  # fmt: skip
 
 
@@ -58,12 +57,21 @@ def test_an_address_that_is_none_is_refused(notebooks, monkeypatch):
         notebooks.repository()
 
 
-def test_binder_installs_the_locked_pytorch_and_every_extra_that_a_tutorial_needs(notebooks):
-    wanted = (BINDER / "requirements.txt").read_text(encoding="utf-8")
+def test_binder_finds_beside_the_notebooks_what_it_installs_for_them(notebooks, monkeypatch, tmp_path):
+    monkeypatch.delenv("BIRTHSIM_REPOSITORY", raising=False)
+    notebooks.write(tmp_path / "nowhere")
+    assert not (tmp_path / "nowhere" / "binder").exists(), "without a repository there is nothing that Binder could open"
+    monkeypatch.setenv("BIRTHSIM_REPOSITORY", "someone/birthsim")
+    notebooks.write(tmp_path)
+    binder = tmp_path / "binder"
+    assert len(list((tmp_path / "notebooks").glob("*.ipynb"))) == len(notebooks.NAMES)
+    assert {path.name for path in binder.iterdir()} == {"constraints.txt", "postBuild", "requirements.txt", "runtime.txt"}
+    assert os.access(binder / "postBuild", os.X_OK)
+    wanted = (binder / "requirements.txt").read_text(encoding="utf-8")
     locked = re.search(r"^torch==(\S+)$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)[1]
     assert f"torch=={locked}+cpu" in wanted.splitlines()
-    assert ".[agents]" in wanted.splitlines()
+    assert "birthsim[agents] @ git+https://github.com/someone/birthsim" in wanted.splitlines()
+    assert "--constraint constraints.txt" in wanted.splitlines()
     first = "".join(read(notebooks, name)[0][0] for name in notebooks.NAMES)
-    assert set(re.findall(r"\.\./\.\.\[(\w+)\]", first)) == {"agents"}
-    assert os.access(BINDER / "postBuild", os.X_OK)
-    assert subprocess.run(["bash", "-n", BINDER / "postBuild"], check=False).returncode == 0
+    assert set(re.findall(r"birthsim\[(\w+)\] @", first)) == {"agents"}
+    assert subprocess.run(["bash", "-n", binder / "postBuild"], check=False).returncode == 0

@@ -29,6 +29,7 @@ TRAINS = {name for name, block in BLOCKS.items() if ".learn(" in block}
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in TRAINS else ()) for name in BLOCKS])
 def test_python_blocks_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(ROOT / "examples")
     names = {}
     exec(compile(BLOCKS[name], name, "exec"), names)
     if "env" in names:

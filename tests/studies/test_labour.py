@@ -1,7 +1,8 @@
-"""The labour model against closed forms and SciPy's integrators; its file."""
+"""The labour model of the example against closed forms and SciPy's integrators; its file."""
 
 import math
 from dataclasses import replace
+from runpy import run_path
 
 import gymnasium
 import numpy as np
@@ -10,8 +11,9 @@ from scipy.integrate import quad, solve_ivp
 
 from birthsim_env.parts.own_parts import stiffness_of, trajectory_of
 from birthsim_env.parts.references import Path
-from lab.studies.labour.model import Labour
+from tests.console import ROOT
 
+Labour = run_path(f"{ROOT}/examples/labour.py")["Labour"]
 FASTER = 25.0
 EVEN = replace(Labour(), floor_yield_force=35.0, floor_stiffness=3500.0, outlet=10.0)
 """The same tissue everywhere."""

@@ -2,33 +2,37 @@
 
 import pytest
 
-from birthsim_env.physics.compiled.sources import ROOT, hashes
-from lab.studies import results, shelf
-from lab.studies.results import changed, provenance, read_result, written
+from baselines.work.calls import names_of
+from birthsim_env.physics.compiled.sources import ROOT, source
+from lab.engine import results, shelf
+from lab.engine.results import beginning, changed, provenance, read_result, written
+from lab.studies.stability import stiffest
 from tests.console import call
 
-MODULE = "lab.studies.stability.stiffest"
 
-
-def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_path):
+def test_a_result_says_what_made_it_and_is_stale_by_the_definition_that_differs(tmp_path):
+    measuring = stiffest.STUDY.measuring
     assert read_result("one", tmp_path) is None
     found = {"seconds": 1.0, "settings": {}, "figures": [["a", 2.0], ["b", None]]}
-    (tmp_path / "one.json").write_text(written(provenance((MODULE,)) | found))
+    (tmp_path / "one.json").write_text(written(provenance(beginning(), measuring, {}) | found))
     result = read_result("one", tmp_path)
     assert result["figures"] == [["a", 2.0], ["b", None]]
     assert len(result["commit"]) == 40
     assert set(result["versions"]) == {"python", "numpy", "numba", "scipy", "gymnasium"}
-    assert changed(result, (MODULE,)) == []
-    assert not {path for path in result["sources"] if path.startswith("tests/") or path == "lab/studies/door.py"}
-    result["sources"]["baselines/registry.py"] = "0"
-    del result["sources"]["baselines/staged.py"]
-    assert changed(result, (MODULE,)) == ["baselines/registry.py", "baselines/staged.py"]
+    assert changed(result, measuring) == []
+    assert not {path for path in result["sources"] if path.startswith(("tests/", "agents/")) or path == "lab/engine/door.py"}
+    result["sources"]["birthsim_env/physics/dynamics.py"]["advance"] = "0"
+    del result["sources"]["birthsim_env/physics/friction.py"]["coulomb_force"]
+    assert changed(result, measuring) == [
+        "birthsim_env/physics/dynamics.py:advance",
+        "birthsim_env/physics/friction.py:coulomb_force",
+    ]
 
 
-def test_a_package_that_a_result_depends_on_names_none_of_a_later_one_for_it():
-    """``birthsim_env.registry`` names rooms above it, which count for what imports them alone."""
-    assert not any(path.startswith("agents/") for path in hashes("birthsim_env.registry"))
-    assert "agents/residual/env.py" in hashes("agents")
+def test_a_result_with_hashes_of_files_names_those_that_changed():
+    path = "birthsim_env/physics/friction.py"
+    content = {"sources": {path: source(ROOT / path).code, "birthsim_env/gone.py": "0", "birthsim_env/reward.py": "0"}}
+    assert changed(content, stiffest.STUDY.measuring) == ["birthsim_env/gone.py", "birthsim_env/reward.py"]
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"a":' * 9000, '{"date": "x"}', "\xff"])
@@ -52,9 +56,10 @@ def test_what_is_no_number_is_no_result():
 
 
 @pytest.mark.parametrize("name", shelf.names())
-def test_every_declared_study_measures_with_files_that_there_are_and_has_a_state(name):
-    study = shelf.declared(name)
-    assert all(f"{module.replace('.', '/')}.py" in hashes(*study.code) for module in study.code)
+def test_every_declared_study_has_a_state_and_measures_by_functions_with_names(name):
+    """A nameless one would be followed by its whole file, tables and pictures too."""
+    named = set().union(*map(names_of, shelf.declared(name).measuring))
+    assert [one for one in named if "<" in one] == []
     assert shelf.state(name).partition(";")[0] in ("fresh", "stale", "not measured yet")
 
 

@@ -6,8 +6,8 @@ import pytest
 
 from baselines.work.tasks import Task
 from birthsim.command_line.command import program
+from lab.engine.study import Options, Study
 from lab.studies import pools
-from lab.studies.study import Options, Study
 
 
 def square(number, log):
@@ -18,7 +18,6 @@ def square(number, log):
 
 def study(log, **more):
     return Study(
-        (__name__,),
         {"numbers": (1, 2), "scale": 2.0, "name": "", "quiet": False},
         lambda options: {k: Task(f"{k}", square, {"number": k, "log": str(log)}) for k in options.numbers},
         lambda options, found: {str(k): options.scale * one["square"] for k, one in found.items()},

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from lab.studies.results import read_result
-from lab.studies.shelf import texts
-from lab.studies.tables import markdown
+from lab.engine.results import read_result
+from lab.engine.shelf import texts
+from lab.engine.tables import markdown
 
 TOLD = {"admittance-backstepping", "admittance-adaptive", "pid", "lqr", "sliding-mode"}
 """Controllers of the comparison that a force sensor tells of the hand."""

@@ -10,15 +10,15 @@ import birthsim_env  # noqa: F401
 from baselines.bench.evaluation import batches
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
+from lab.engine.results import read_result
+from lab.engine.shelf import declared, names, texts
+from lab.engine.worlds import COUNT, SEED, worlds
 from lab.studies.bandwidth import study as bandwidth
 from lab.studies.comparison import study as comparison
 from lab.studies.comparison.grid import Conditions, as_described, run_cell, settings_of
 from lab.studies.comparison.headline import CONTROLLERS, is_shown, learns_mass
 from lab.studies.comparison.privileged import TOLD, evaluate_privileged, privileged_controller
 from lab.studies.leaderboard import RULES, TABLE, table
-from lab.studies.results import read_result
-from lab.studies.shelf import declared, names, texts
-from lab.studies.worlds import COUNT, SEED, worlds
 
 CIRCLE = "BirthSIM/Circle-v1"
 PAPER = ("figure4",)
@@ -47,7 +47,7 @@ def test_the_leaderboard_names_its_worlds():
     assert TABLE.read_text(encoding="utf-8") == table()
 
 
-@pytest.mark.parametrize("name", [name for name in names() if declared(name).code[0] == comparison.COMPARISON.code[0]])
+@pytest.mark.parametrize("name", [name for name in names() if declared(name).keep is comparison.COMPARISON.keep])
 def test_what_compares_controllers_does_so_on_the_test_set(name):
     options = declared(name).options
     if CIRCLE in options.get("env", ()):

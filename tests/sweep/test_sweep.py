@@ -12,7 +12,7 @@ from optuna.storages.journal import JournalFileBackend
 
 from baselines import evaluate, make_controller
 from birthsim_env import Parameters
-from lab.studies.results import read_result
+from lab.engine.results import read_result
 from lab.studies.sweeps.plan import load_sweep
 from lab.studies.sweeps.study import EXAMPLE
 from tests.console import call

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from baselines.work import tasks
+from baselines.bench.pieces import evaluate_piece
+from baselines.work import asked, tasks
+from baselines.work.calls import called_by
 from baselines.work.tasks import Task, code_stamp, run_tasks
-from birthsim_env.physics.compiled.sources import hashes
+from birthsim_env.registry import entry, register
 
 
 def square(log, number):
@@ -50,7 +52,7 @@ def test_results_are_written_piece_by_piece_and_come_back_as_written(log, tmp_pa
     task = made(log)[3]
     content = json.loads((tmp_path / "out" / task.file()).read_text())
     assert content["result"] == {"square": 9, "nothing": None}
-    assert content["code"] == task.code() == code_stamp(__name__)
+    assert content["code"] == code_stamp(task.work)
     assert content["settings"] == task.settings
 
 
@@ -76,7 +78,7 @@ def test_pieces_of_other_settings_or_other_code_are_computed_anew(log, tmp_path,
     assert ran(log)[5:] == [7]
     assert results["deep/2"]["square"] == 49
     assert "work: 2 of 3 are there with these settings, rig and code, and are kept" in capsys.readouterr().out
-    monkeypatch.setattr(tasks, "code_stamp", lambda module: {"version": "other"})
+    monkeypatch.setattr(tasks, "code_stamp", lambda work, used: {"version": "other"})
     run_tasks(made(log, numbers=[0, 1]), tmp_path / "out", 1, "work")
     assert ran(log)[6:] == [0, 1]
 
@@ -121,11 +123,28 @@ def test_ctrl_c_right_after_a_piece_is_written_counts_it(log, tmp_path, monkeypa
     assert "work: 1 of 3 are complete and kept; the same command goes on" in capsys.readouterr().out
 
 
-def test_the_stamp_follows_what_a_piece_imports_and_nothing_else():
-    stamp = code_stamp("baselines.bench.pieces")
-    assert {"version", "sources", "python", "numpy", "numba", "scipy"} == set(stamp)
-    sources = hashes("baselines.bench.pieces")
-    assert {"birthsim_env/physics/plant.py", "baselines/admittance/law.py"} <= set(sources)
-    others = [name for name in sources if name.startswith(("baselines/figures", "birthsim/"))]
-    assert [name for name in others if not name.endswith("__init__.py")] == []
-    assert code_stamp("json") != stamp
+def test_the_stamp_follows_what_a_piece_calls_and_nothing_else():
+    stamp = code_stamp(evaluate_piece)
+    assert {"version", "called", "python", "numpy", "numba", "scipy"} == set(stamp)
+    called = called_by([evaluate_piece])
+    assert {"baselines/bench/evaluation.py:evaluate", "birthsim_env/physics/plant.py:Plant"} <= set(called)
+    assert "baselines/bench/pieces.py:gathered" not in called
+    assert [name for name in called if name.startswith(("baselines/figures", "birthsim/", "lab/"))] == []
+    assert code_stamp(math.sqrt) != stamp
+
+
+def made_by_name(name):
+    register(hand=name, about="Of this test.")(made_by_name)
+    return {"made": entry("hand", name).name}
+
+
+def test_a_piece_keeps_which_entries_it_asked_for_and_is_computed_anew_where_one_changed(tmp_path, monkeypatch):
+    """In another process, which tells this one of it."""
+    one, two = (Task(name, made_by_name, {"name": f"hand {name}"}) for name in ("one", "two"))
+    monkeypatch.setattr(asked, "_ELSEWHERE", {})
+    run_tasks([one, two], tmp_path, 2, "work")
+    content = json.loads((tmp_path / one.file()).read_text())
+    assert content["used"]["hand=hand one"] == asked.asked()["hand=hand one"] == __name__
+    assert tasks.is_kept(one, tmp_path)
+    monkeypatch.setattr(tasks, "called_by", lambda work, used: {"hand": "changed"} if "hand=hand one" in used else {})
+    assert not tasks.is_kept(one, tmp_path)

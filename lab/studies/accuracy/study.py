@@ -5,11 +5,12 @@ from typing import Any
 
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Options, Study, the_only_one
 from lab.studies.accuracy import tables
 from lab.studies.accuracy.errors import measure, rigs_to_measure
 from lab.studies.accuracy.motions import MOTIONS
-from lab.studies.results import Content
-from lab.studies.study import Options, Study
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -34,12 +35,12 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
 
 
 STUDY = Study(
-    ("lab.studies.accuracy.errors", "lab.studies.accuracy.motions"),
     {"rigs": 8, "seed": 0, "parameters": ""},
     _tasks,
-    lambda _, found: found[""],
+    the_only_one,
     {"position_m": "m", "pressure_relative": "", "steps_s": "s"},
     _shown,
     _pictures,
     words={"rigs": "random corners, and as many random rigs", "parameters": "TOML file of the nominal rig"},
 )
+register(study="accuracy", about="the error of the plant's integrator, against a second model")(STUDY)

@@ -16,14 +16,15 @@ from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.bandwidth.valves import commanded_openings
 from lab.studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
 from lab.studies.haptics.multisine import FADE, sines, unit_multisine
 from lab.studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
-from lab.studies.results import Content
 from lab.studies.sensorless.own_logs import Informed
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 STIFFNESS = 2000.0
 """N/m."""
@@ -266,7 +267,6 @@ def _stimuli(content: Content) -> str:
 
 
 STUDY = Study(
-    (__name__,),
     {"peak": (2.0, 10.0, 20.0), "rigs": 36, "seed": 7_300_000},
     _tasks,
     _kept,
@@ -274,3 +274,4 @@ STUDY = Study(
     _shown,
     words={"peak": "N that multisines of the hand reach", "rigs": "randomised ones"},
 )
+register(study="bandwidth", about="up to which frequency a hand feels what is declared")(STUDY)

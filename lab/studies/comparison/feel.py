@@ -6,10 +6,11 @@ from typing import Any
 from baselines.bench.pieces import controller_settings
 from baselines.work.tasks import Task
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
 from lab.studies.comparison.grid import default_controllers
 from lab.studies.comparison.stiffness import study_tasks
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -32,13 +33,12 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
 
 
 STUDY = Study(
-    ("lab.studies.comparison.stiffness",),
     {"controller": tuple(default_controllers()), "parameters": ""},
     _tasks,
     _kept,
     {"stiffness": "N/m", "error_mm": "mm", "error_percent": "%", "angles": "rad", "amplitudes": "N"},
-    lambda _: {},
-    _pictures,
+    draw=_pictures,
     partial=True,
     words={"controller": "registered names, with options, or path/to/file.py:Class"},
 )
+register(study="stiffness", about="how the stiffness of every controller feels")(STUDY)

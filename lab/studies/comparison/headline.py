@@ -6,10 +6,10 @@ from agents.policy.files import load_policy
 from agents.policy.seeds import policy_folders
 from baselines.bench.statistics import number
 from baselines.registry import resolved, uses_force
+from lab.engine.tables import markdown
 from lab.studies.comparison.grid import LEARNED, Conditions
 from lab.studies.comparison.privileged import TOLD
 from lab.studies.comparison.tables import Figures, controllers_of
-from lab.studies.tables import markdown
 
 COLUMNS = {
     ("ideal", "nominal"): "ideal, nominal rig",

@@ -9,7 +9,10 @@ from typing import Any
 from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.registry import names
+from birthsim_env.registry import names, register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study, no_pictures
+from lab.engine.worlds import COUNT, SEED, worlds
 from lab.studies.comparison.grid import (
     COMPARED,
     ENVIRONMENTS,
@@ -39,9 +42,6 @@ from lab.studies.comparison.tables import (
     overview,
     settled,
 )
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study, no_pictures
-from lab.studies.worlds import COUNT, SEED, worlds
 
 COLUMNS = ("environment", "sensors", "plant", "hand", "controller", "metric", *SUMMARY, *RATIO, "lost", "episodes")
 """Of the figures; ``SUMMARY`` is in the metric's unit."""
@@ -188,9 +188,7 @@ def comparison(
     **options: Any,
 ) -> Study:
     """A study of some controllers under some conditions; ``options`` are defaults that differ from those of the comparison."""
-    learned = any(own.startswith(LEARNED) for own in options.get("controller", ()))
     return Study(
-        ("lab.studies.comparison.grid", *(("agents.policy.controller",) if learned else ())),
         {
             "env": ENVIRONMENTS,
             "controller": tuple(default_controllers()),
@@ -259,3 +257,9 @@ ACCELERATION = comparison(
     controller=("admittance-adaptive", "admittance-sensorless"),
     parameters="examples/acceleration_sensor_rig.toml",
 )
+register(study="acceleration", about="what an acceleration sensor adds")(ACCELERATION)
+register(study="bound", about="how far controllers are from a planner that looks ahead")(BOUNDED)
+register(study="circle", about="controllers and policies on circles that guided no decision")(CIRCLES)
+register(study="comparison", about="every controller under all conditions")(COMPARISON)
+register(study="honest", about="what honest sensors cost")(HONEST)
+register(study="limited", about="what a limiter costs")(LIMITED)

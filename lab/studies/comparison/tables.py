@@ -8,8 +8,8 @@ from typing import Any
 
 from baselines.bench.statistics import number
 from baselines.registry import uses_force
+from lab.engine.tables import markdown
 from lab.studies.comparison.grid import METRICS, MOVING, RIGS
-from lab.studies.tables import markdown
 
 Figures = Sequence[dict[str, Any]]
 """What ``lab.studies.comparison.grid.statistics`` returns."""

@@ -15,7 +15,8 @@ from tqdm import tqdm
 from baselines.work.side_by_side import ONE_THREAD
 from birthsim.command_line.settings import MANY, Configured, Seed, whole
 from birthsim_env.files import write_json
-from lab.studies.alone import only_under
+from birthsim_env.registry import register
+from lab.engine.alone import only_under
 from lab.studies.fuzz.harness import Case, Figures, fuzz, generator
 from lab.studies.fuzz.kinds import KINDS
 
@@ -35,6 +36,7 @@ class Settings(Configured):
     """File for the figures, JSON."""
 
 
+@register(study="fuzz", about="odd input to everything that is read or called")
 def main(settings: Settings) -> None:
     """Fuzz on one thread, since children are forked, and without a window."""
     only_under({"SDL_VIDEODRIVER": "dummy", **ONE_THREAD})

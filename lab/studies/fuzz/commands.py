@@ -9,9 +9,9 @@ from typing import Any
 from unittest.mock import patch
 
 from birthsim.command_line.command import perform_with, program
+from lab.engine.shelf import declared
 from lab.studies.fuzz.harness import Case, Kind
 from lab.studies.fuzz.mutations import Rng
-from lab.studies.shelf import declared
 
 MODULES = {
     **{

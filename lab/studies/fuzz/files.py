@@ -146,7 +146,7 @@ def loaded(_: Path) -> None:
 
     make_controller("pid", Parameters())
     trajectory_of(lambda time: (0.5, 0.0), 1.0).sample(np.zeros(2))
-    baselines.work.tasks.code_stamp("tests.fuzz.files")
+    baselines.work.tasks.code_stamp(loaded)
 
 
 def _tasks(folder: Path) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def _entry(valid: dict[str, Any], rng: Rng, folder: Path, case: Case) -> None:
 
 
 def _results(folder: Path) -> dict[str, Any]:
-    from lab.studies.results import read_result
+    from lab.engine.results import read_result
 
     loaded(folder)
     content = read_result("stiffest")
@@ -96,7 +96,7 @@ def _results(folder: Path) -> dict[str, Any]:
 
 
 def _result(valid: dict[str, Any], rng: Rng, folder: Path, case: Case) -> None:
-    from lab.studies.results import changed, read_result
+    from lab.engine.results import changed, read_result
 
     path = written(case, folder / "stiffest.json", json_bytes(rng, valid))
     content = read_result(path.stem, folder)

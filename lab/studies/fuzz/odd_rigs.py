@@ -24,6 +24,7 @@ from birthsim.command_line.settings import Configured, Seed, whole
 from birthsim.command_line.start import perform
 from birthsim.main import load
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import register
 
 
 @dataclass(kw_only=True)
@@ -91,6 +92,7 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
         return "BAD", traceback.format_exc()
 
 
+@register(study="odd-rigs", about="random rigs through every command")
 def main(settings: Settings) -> None:
     """Try the commands."""
     counts: dict[str, Counter[str]] = {command: Counter() for command in COMMANDS}

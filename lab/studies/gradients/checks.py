@@ -4,17 +4,17 @@ from typing import Any
 
 import numpy as np
 
-import agents  # noqa: F401  registers the residual environments
+from agents.residual.env import ResidualVectorEnv
 from baselines.bench.statistics import quantile
 from baselines.registry import LIMITED
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios
-from birthsim_env.registry import names
+from birthsim_env.registry import names, register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.comparison.grid import default_controllers
 from lab.studies.gradients.loops import begun, compared
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 CIRCLE = "BirthSIM/Circle-v1"
 ENVIRONMENTS = tuple(environment_id(name) for name in studied_scenarios())
@@ -58,4 +58,5 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 UNITS = {"equal": "1", "lanes": "1", "median": "1", "middle": "1", "any": "1", "worst": "1"}
-STUDY = Study((__name__, "agents.residual.env"), {"states": 1000, "lanes": 256}, _tasks, _kept, UNITS, _shown)
+STUDY = Study({"states": 1000, "lanes": 256}, _tasks, _kept, UNITS, _shown, beside=(ResidualVectorEnv,))
+register(study="gradients-checks", about="gradients through closed loops beside differences")(STUDY)

@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-import agents  # noqa: F401  registers the residual environments
+from agents.residual.env import ResidualVectorEnv
 from baselines.bench.statistics import quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env import Plant
@@ -16,11 +16,12 @@ from birthsim_env.gradients.plant import Derivatives, jvp, vjp
 from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.gradients.figure import friction_figure
 from lab.studies.gradients.states import plant_of
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 STEP, TURNS = 0.01, 25
 """s of a policy step; turns of which the median is taken."""
@@ -161,4 +162,5 @@ UNITS = {
     "forward": "s", "taped": "s", "backward": "s", "after": "s", "change": "1", "median": "1", "q90": "1",
     "opening": "1", "moved": "m", "slope": "m",
 }  # fmt: skip
-STUDY = Study((__name__, "agents.residual.env"), {}, _tasks, _kept, UNITS, _shown, _drawn, timed=True)
+STUDY = Study({}, _tasks, _kept, UNITS, _shown, _drawn, timed=True, beside=(ResidualVectorEnv,))
+register(study="gradients", about="what gradients cost, and how far they can be trusted")(STUDY)

@@ -8,12 +8,12 @@ from typing import Any
 from baselines.bench.pieces import controller_settings
 from baselines.work.tasks import Task
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.registry import names
+from birthsim_env.registry import names, register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study, no_pictures
 from lab.studies.haptics.kept import kept
 from lab.studies.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
 from lab.studies.haptics.tables import report
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study, no_pictures
 
 UNITS = {
     "stiffness": "N/m", "peak": "N", "bandwidth": "Hz", "unnoticed": "Hz", "unnoticed_without_work": "Hz", "energy": "J",
@@ -56,7 +56,6 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
 def _haptics(name: str, draw: Callable[[Content, Path], list[Path]], **options: Any) -> Study:
     """A study of some controllers; the seeds are of worlds on which nothing was tuned or decided."""
     return Study(
-        ("lab.studies.haptics.measurements",),
         {
             "controller": ("backstepping", "backstepping-cartesian", "admittance-backstepping", "pid"),
             "sensors": ("ideal", "lab"),
@@ -104,3 +103,6 @@ ACCELERATION = _haptics(
     controller=("admittance-adaptive",),
     parameters="examples/acceleration_sensor_rig.toml",
 )
+register(study="acceleration-feel", about="a pull let go with an acceleration sensor")(ACCELERATION)
+register(study="haptics", about="what a hand feels")(STUDY)
+register(study="limits", about="what a hand feels of a controller in a limiter")(LIMITS)

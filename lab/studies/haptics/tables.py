@@ -7,10 +7,10 @@ import numpy as np
 
 from baselines.bench.statistics import number, quantile
 from birthsim_env.physics.compiled.lanes import Array
+from lab.engine.tables import markdown
 from lab.studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
 from lab.studies.haptics.kept import PEAK
 from lab.studies.haptics.release import PULL, STIFFNESS
-from lab.studies.tables import markdown
 
 Runs = Sequence[dict[str, Any]]
 """What ``lab.studies.haptics.kept.kept`` gives, in the order of the rows."""

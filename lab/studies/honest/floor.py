@@ -7,11 +7,12 @@ import numpy as np
 from baselines.bench.statistics import number, quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Options, Study, as_found
+from lab.engine.tables import markdown
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.sensor_floor import probe_floor
-from lab.studies.results import Content
-from lab.studies.study import Options, Study
-from lab.studies.tables import markdown
 
 UNITS = {"stiffness_error": "%", "held_error": "mm"}
 FRACTIONS = {"median": 0.5, "q95": 0.95, "worst": 1.0}
@@ -40,10 +41,10 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    ("lab.studies.honest.sensor_floor",),
     {"episodes": 128, "seed": 70000, "parameters": ""},
     _tasks,
-    lambda _, found: dict(found),
+    as_found,
     UNITS,
     _shown,
 )
+register(study="floor", about="what errors of honest sensors leave to controllers")(STUDY)

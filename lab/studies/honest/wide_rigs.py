@@ -17,11 +17,12 @@ from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import carried
-from lab.studies.results import Content
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import cells, markdown
+from lab.engine.worlds import worlds
 from lab.studies.sensorless.rigs import OFF, around
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import cells, markdown
-from lab.studies.worlds import worlds
 
 RANGES = {
     "mechanics.mass": (1.0, 10.0), "air.supply_pressure": (5e5, 9e5),
@@ -125,7 +126,6 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,),
     {"controller": ("admittance-backstepping", "admittance-adaptive"), "episodes": 256, "seed": 948000},
     _tasks,
     _kept,
@@ -133,3 +133,4 @@ STUDY = Study(
     _shown,
     words={"controller": "registered names, with options"},
 )
+register(study="wide-rigs", about="controllers on rigs of 1 to 10 kg that they do not know")(STUDY)

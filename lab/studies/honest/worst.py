@@ -20,12 +20,12 @@ from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, load_parameters, value_of
 from birthsim_env.physics.rig.values import checked_number
-from birthsim_env.registry import names
+from birthsim_env.registry import names, register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.search import Seeds, drawn_places, hardest, parameters_at, rigs_at
-from lab.studies.results import Content
-from lab.studies.study import Options, Study
-from lab.studies.tables import markdown
 
 ENVIRONMENT = environment_id("probe")
 PUSHED = find_scenario("probe").duration - REST
@@ -175,8 +175,11 @@ def _evaluated(
     return evaluate_worlds(ENVIRONMENT, law, name, own, rigs, progress=False, **setting)
 
 
+def _kept(options: Options, found: Found) -> Any:
+    return list(found.values())
+
+
 STUDY = Study(
-    (__name__,),
     {
         "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"),
         "sensors": tuple(names("sensors")),
@@ -189,7 +192,7 @@ STUDY = Study(
         "parameters": "",
     },
     _tasks,
-    lambda _, found: list(found.values()),
+    _kept,
     {**UNITS, "push_n": "N", "way_mm": "mm"},
     _shown,
     allowed={"sensors": tuple(names("sensors")), "metric": tuple(UNITS)},
@@ -202,3 +205,4 @@ STUDY = Study(
         "parameters": "TOML file of the rig as the controllers believe it",
     },
 )
+register(study="worst", about="the worst worlds, and what each owes to its figures")(STUDY)

@@ -9,8 +9,8 @@ from typing import Any
 from birthsim_env.files import write_json, write_text
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Listed
+from lab.engine.results import commit
 from lab.studies.kills.tries import SCENARIOS, Outcome
-from lab.studies.results import commit
 
 COLUMNS = ("times", "tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
 

@@ -16,11 +16,12 @@ from baselines.registry import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import cells, markdown
+from lab.engine.worlds import worlds
 from lab.studies.learned import felt
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import cells, markdown
-from lab.studies.worlds import worlds
 
 
 class Run(NamedTuple):
@@ -192,13 +193,11 @@ def _side_by_side(content: Content, folder: Path) -> list[Path]:
     return draw_side_by_side(curves, folder, "from_scratch")
 
 
-SOURCES = ("agents.policy.controller", "agents.policy.pieces", "lab.studies.learned.study")
 UNITS = {"settled_rms": "mm", "stiffness_error": "%", "noticed": "1", "energy": "mJ", "air": "l/min", "saturation": "%"}
 GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
 WORDS = {"policy": "shipped policies, each in its own worlds"}
 
 BY_GRADIENTS = Study(
-    SOURCES,
     {"policy": GRADIENTS},
     _tasks,
     _kept,
@@ -209,4 +208,6 @@ BY_GRADIENTS = Study(
     words=WORDS,
 )
 OTHERS = tuple(name for name in RUNS if name not in GRADIENTS)
-STUDY = Study(SOURCES, {"policy": OTHERS}, _tasks, _kept, UNITS, _shown, _pictures, allowed={"policy": OTHERS}, words=WORDS)
+STUDY = Study({"policy": OTHERS}, _tasks, _kept, UNITS, _shown, _pictures, allowed={"policy": OTHERS}, words=WORDS)
+register(study="by-gradients", about="policies by gradients beside classical controllers")(BY_GRADIENTS)
+register(study="learned", about="what shipped policies take off controllers' errors")(STUDY)

@@ -11,11 +11,12 @@ from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
+from lab.engine.worlds import worlds
 from lab.studies.least_air.schedule import least_air
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
-from lab.studies.worlds import worlds
 
 PUSHES = {"circle": [(30.0, 0.0), (-30.0, 0.0), (0.0, 30.0), (0.0, -30.0)], "descent": [(80.0, 0.0)]}
 """N: the strongest pushes of the scenarios' hands."""
@@ -89,7 +90,6 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,),
     {"scenario": tuple(PUSHES), "episodes": 64, "seed": 96000},
     _tasks,
     _kept,
@@ -97,3 +97,4 @@ STUDY = Study(
     _shown,
     allowed={"scenario": tuple(PUSHES)},
 )
+register(study="air", about="how much air the schedule of least air saves")(STUDY)

@@ -30,10 +30,10 @@ from birthsim.command_line.settings import MANY, Configured, number, whole
 from birthsim_env.files import write_json
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
+from lab.engine.results import MOST
 from lab.studies.mutation.changes import mutants_of
 from lab.studies.mutation.modules import MODULES, files_of
 from lab.studies.mutation.uncompiled import switch_off
-from lab.studies.results import MOST
 
 LIMIT = 40.0
 """CPU seconds of one test, uncompiled, beyond which it is left out (``--limit``). The balance of the chambers needs 25."""

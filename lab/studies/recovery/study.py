@@ -10,9 +10,10 @@ from baselines.identification.free_parameters import FREE_PARAMETERS
 from baselines.work.tasks import Task
 from birthsim_env.parts.drawn.randomization import Ranges
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
 from lab.studies.recovery.tasks import EXPERIMENTS, RANGES, recovery_tasks
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -61,7 +62,6 @@ def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> li
 
 def _recovery(name: str, rigs: int, experiment: str) -> Study:
     return Study(
-        ("lab.studies.recovery.tasks",),
         {"rigs": rigs, "seed": 82000, "duration": 12.0, "experiment": experiment},
         _tasks,
         _kept,
@@ -74,3 +74,5 @@ def _recovery(name: str, rigs: int, experiment: str) -> Study:
 
 
 STUDY, AT_REST = _recovery("recovery", 50, "proposed"), _recovery("recovery-rest", 10, "rest")
+register(study="recovery", about="how well identification finds rigs that are known")(STUDY)
+register(study="recovery-rest", about="what a log of a rig at rest tells of it")(AT_REST)

@@ -22,13 +22,13 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.files import finite
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.registry import names
+from birthsim_env.registry import names, register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
+from lab.engine.worlds import worlds
 from lab.studies.haptics.rendering import rendering
 from lab.studies.haptics.worlds import Condition
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
-from lab.studies.worlds import worlds
 
 ERRORS = {"error": "settled error, mm", "stiffness": "error along the push, %"}
 STATIC = "static stiffness error, %: median", "95 %"
@@ -244,7 +244,6 @@ def _entry(value: Any) -> str:
 
 
 STUDY = Study(
-    (__name__,),
     {
         "policy": "circle_honest_student",
         "beside": ("admittance-sensorless",),
@@ -267,3 +266,4 @@ STUDY = Study(
         "seed": "of the first episode",
     },
 )
+register(study="beside-law", about="policies of several seeds beside their controller")(STUDY)

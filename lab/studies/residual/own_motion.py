@@ -19,11 +19,12 @@ from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
+from lab.engine.worlds import worlds
 from lab.studies.honest.sensor_floor import motion_floor, static_only
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
-from lab.studies.worlds import worlds
 
 HANDS = ("steps", "sine", "noise", "guided")
 PARTS = (0.5, 0.95, 1.0)
@@ -132,7 +133,6 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__, "agents.policy.pieces"),
     {
         "policy": "circle_honest_apg",
         "sensors": "honest",
@@ -150,3 +150,4 @@ STUDY = Study(
         "seed": "of the first episode",
     },
 )
+register(study="own-motion", about="policies beside the impedance they are to render")(STUDY)

@@ -14,9 +14,10 @@ from baselines.work.tasks import Result, Task
 from birthsim_env import balanced_pressures, linearize
 from birthsim_env.gradients.linear.model import LinearModel
 from birthsim_env.physics.compiled.lanes import Array
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 
 FREQUENCY = np.geomspace(0.05, 200, 2000)
 """Hz."""
@@ -126,7 +127,6 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
 
 
 STUDY = Study(
-    (__name__,),
     {"pose": (0.5, 0.0)},
     _tasks,
     _kept,
@@ -135,3 +135,4 @@ STUDY = Study(
     _drawn,
     words={"pose": "end effector x and y, m"},
 )
+register(study="responses", about="frequency responses of the rig, and their resonances")(STUDY)

@@ -14,12 +14,12 @@ from baselines.bench.statistics import penalize_lost, summarize
 from baselines.registry import make_controller, uncontrolled_names
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.registry import names
+from birthsim_env.registry import names, register
 from birthsim_env.scores import RIGS, ROLES, SENSORS
+from lab.engine.results import Content, written
+from lab.engine.study import Found, Options, Study
 from lab.studies.comparison.grid import ENVIRONMENTS, default_controllers
-from lab.studies.results import Content, written
 from lab.studies.scores.tables import Scored, data, overview
-from lab.studies.study import Found, Options, Study
 
 REFERENCE = "reference_scores.json"
 """What stands in ``birthsim_env/scores.json``."""
@@ -139,10 +139,10 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__, "agents.policy.controller"),
     {"episodes": 64, "seed": 70000},
     _tasks,
     _kept,
     {"returns": "reward", "halves": "reward", "error": "mm", "lost": "", "success": ""},
     _shown,
 )
+register(study="scores", about="what every environment pays to whom")(STUDY)

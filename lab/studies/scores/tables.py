@@ -9,7 +9,7 @@ from typing import Any
 from baselines.bench.measures import DISCOUNTS
 from baselines.bench.statistics import number
 from birthsim_env.scores import BEST, ROLES, SHUT
-from lab.studies.tables import markdown
+from lab.engine.tables import markdown
 
 DATA = (
     *("scenario", "sensors", "rig", "controller", "score", "error, mm", "success, %", "lost, %"),

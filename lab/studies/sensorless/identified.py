@@ -7,13 +7,14 @@ from baselines.work.tasks import Task
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
 from lab.studies.comparison.grid import as_described
 from lab.studies.recovery.study import recovery_table
-from lab.studies.results import Content
 from lab.studies.sensorless.own_logs import identified, measure
 from lab.studies.sensorless.study import RIGS, kept, stem_of, tables
 from lab.studies.sensorless.study import STUDY as SENSORLESS
-from lab.studies.study import Found, Options, Study
 
 LANES = 32
 """Worlds of a piece."""
@@ -53,7 +54,6 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    ("lab.studies.sensorless.own_logs",),
     {"duration": 5.0, "episodes": 256, "seed": 936000},
     _logs,
     _kept,
@@ -62,3 +62,4 @@ STUDY = Study(
     further=_felt,
     words={"duration": "s of each log", "episodes": "drawn worlds"},
 )
+register(study="identified", about="what a hand feels once a rig is identified from its own log")(STUDY)

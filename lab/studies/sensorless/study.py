@@ -12,11 +12,13 @@ from baselines.work.tasks import Task
 from birthsim_env.parts.scenarios import studied_scenarios
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import cells, markdown
+from lab.engine.worlds import worlds
 from lab.studies.sensorless.measures import measure
 from lab.studies.sensorless.rigs import PLANTS, believed
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import cells, markdown
-from lab.studies.worlds import worlds
 
 RIGS = {
     "acceleration, no force": ("admittance-sensorless", "examples/acceleration_sensor_rig.toml"),
@@ -82,11 +84,18 @@ def tables(figures: Any, settings: dict[str, Any]) -> str:
     return "\n\n".join(found) + "\n"
 
 
+def _kept(options: Options, found: Found) -> Any:
+    return kept(options.plant, found)
+
+
+def _shown(content: Content) -> dict[str, str]:
+    return {"sensorless.md": tables(content["figures"], content["settings"])}
+
+
 STUDY = Study(
-    ("lab.studies.sensorless.measures",),
     {"plant": PLANTS, "episodes": 128, "seed": 330000},
     _tasks,
-    lambda options, found: kept(options.plant, found),
+    _kept,
     {
         "stiffness_error": "%",
         "hunting": "mm",
@@ -98,7 +107,8 @@ STUDY = Study(
         "clamped_air": "l/min",
         "turns": "1/s",
     },
-    lambda content: {"sensorless.md": tables(content["figures"], content["settings"])},
+    _shown,
     allowed={"plant": PLANTS},
     words={"plant": "what the controller knows of the rig"},
 )
+register(study="sensorless", about="what a hand feels without a force sensor")(STUDY)

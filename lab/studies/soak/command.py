@@ -15,12 +15,14 @@ from typing import Annotated, Any
 import numpy as np
 from tqdm import tqdm
 
+from baselines.work.asked import registered
 from baselines.work.side_by_side import ONE_THREAD
 from baselines.work.tasks import code_stamp
 from birthsim.command_line.settings import Configured, Seed, whole
 from birthsim_env.files import make_folder, write_json, write_text
 from birthsim_env.physics.rig.json_reading import parse_json
-from lab.studies.alone import only_under
+from birthsim_env.registry import register
+from lab.engine.alone import only_under
 from lab.studies.soak.laps import LANES, STEPS, run
 
 GROWTH = 10.0
@@ -106,10 +108,12 @@ class Settings(Configured):
     """Folder for laps.jsonl, soak.md and soak.json."""
 
 
+@register(study="soak", about="10^8 policy steps over all that there is")
 def main(settings: Settings) -> None:
     """Run the laps that are missing."""
     only_under(ONE_THREAD)
-    setting = {"seed": settings.seed, "lanes": LANES, "steps": STEPS, "code": code_stamp("lab.studies.soak.laps")}
+    code = code_stamp(run, registered("controller", "sensors", "scenario", "hand"))
+    setting = {"seed": settings.seed, "lanes": LANES, "steps": STEPS, "code": code}
     journal = make_folder(settings.out) / "laps.jsonl"
     laps = stored(journal, setting)
     wanted = -(-settings.steps // (LANES * STEPS))

@@ -19,13 +19,14 @@ from baselines.staged import driving
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.comparison.grid import default_controllers
-from lab.studies.results import Content
 from lab.studies.speed import speeds as speed
 from lab.studies.speed.stopwatch import seconds_per_call, step, vector_step
 from lab.studies.speed.twin import Twin, has_compiler
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 POLICY_PERIOD = 0.01
 PERIODS = 50
@@ -253,7 +254,6 @@ def _number(value: float | None) -> str:
 
 
 STUDY = Study(
-    (__name__, "lab.studies.speed.stopwatch"),
     {"seconds": 1.0, "beside": "", "compile": False},
     _tasks,
     _kept,
@@ -266,3 +266,4 @@ STUDY = Study(
         "compile": "measure instead how long first steps take, compiled and cached",
     },
 )
+register(study="speed", about="speeds, beside what they are to be compared with")(STUDY)

@@ -11,10 +11,11 @@ from typing import Any
 
 from baselines.backstepping.stiffest import PART
 from baselines.work.tasks import Task
-from lab.studies.results import Content
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.stability.swinging import stiffest
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
 """kg, s and s; without latency positions are exact."""
@@ -42,4 +43,5 @@ def _entry(value: Any) -> str:
     return "-" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
-STUDY = Study(("lab.studies.stability.swinging",), {}, _tasks, _kept, UNITS, _shown)
+STUDY = Study({}, _tasks, _kept, UNITS, _shown)
+register(study="stiffest", about="stiffest setpoints at which the paper's law rests")(STUDY)

@@ -6,12 +6,12 @@ from typing import Any
 from baselines.bench.pieces import controller_settings
 from baselines.work.tasks import Task
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.registry import names
-from lab.studies.results import Content
+from birthsim_env.registry import names, register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.stability import maps as stability
 from lab.studies.stability.maps import MAPS, describe_map, stability_tasks
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -71,7 +71,6 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
 
 
 STUDY = Study(
-    ("lab.studies.stability.maps",),
     {
         "controller": "admittance-backstepping",
         "sensors": "lab",
@@ -93,3 +92,4 @@ STUDY = Study(
         "parameters": "TOML file of the rig as it is believed",
     },
 )
+register(study="stability", about="maps of where a controller is stable")(STUDY)

@@ -6,10 +6,11 @@ import numpy as np
 
 from baselines.bench.statistics import penalize_lost
 from baselines.work.tasks import Task
-from lab.studies.results import Content
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
 from lab.studies.strangers.tasks import STRANGERS, stranger_tasks
-from lab.studies.study import Found, Options, Study
-from lab.studies.tables import markdown
 
 BELIEFS = ("owner", "identified")
 
@@ -63,7 +64,6 @@ def _worst(results: list[dict[str, Any]], key: str) -> float:
 
 
 STUDY = Study(
-    ("lab.studies.strangers.tasks",),
     {"rigs": 2, "seed": 93000, "duration": 12.0, "controller": ("admittance-adaptive", "admittance-sensorless")},
     _tasks,
     _kept,
@@ -72,3 +72,4 @@ STUDY = Study(
     words={"duration": "s of each log", "rigs": "randomised, of each kind"},
 )
 """What identification and controllers make of rigs that the model lacks."""
+register(study="strangers", about="identification and controllers on rigs that the model lacks")(STUDY)

@@ -10,8 +10,8 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.work.tasks import Result
 from birthsim_env.extras import installation
+from lab.engine.tables import markdown
 from lab.studies.sweeps.plan import Point
-from lab.studies.tables import markdown
 
 SHOWN_POINTS = 100
 """Rows of the table; the Parquet file has all."""

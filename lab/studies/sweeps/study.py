@@ -8,8 +8,9 @@ from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Task
 from birthsim_env.files import finite
 from birthsim_env.physics.compiled.sources import ROOT
-from lab.studies.results import Content
-from lab.studies.study import Found, Options, Study
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
 from lab.studies.sweeps.plan import HeatMap, Sweep, load_sweep
 from lab.studies.sweeps.report import episodes, figures, table, write_parquet
 from lab.studies.sweeps.search import best_trial, next_trials, write_journal
@@ -73,7 +74,6 @@ def _written(options: Options, found: Found, folder: Path) -> list[str]:
 
 
 STUDY = Study(
-    ("lab.studies.sweeps.work", "agents.policy.controller"),
     {"file": ""},
     _tasks,
     _kept,
@@ -86,3 +86,4 @@ STUDY = Study(
     first="file",
     words={"file": "TOML file with tables [base], [grid], [draw], [search] and [[map]], as docs/sweeps.md says"},
 )
+register(study="sweep", about="grids, random draws and searches, from a TOML file")(STUDY)

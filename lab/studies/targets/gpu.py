@@ -18,7 +18,7 @@ import numpy as np
 
 import agents as agents  # registers ids with a controller inside
 from birthsim_build.device.machine import machine_named
-from lab.studies.tables import markdown
+from lab.engine.tables import markdown
 
 LOOPS: dict[str, tuple[str, dict[str, Any]]] = {
     "Circle, ideal": ("BirthSIM/Circle-v1", {}),

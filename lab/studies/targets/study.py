@@ -20,9 +20,10 @@ from birthsim_env.files import write_json
 from birthsim_env.parts.scenarios import studied_scenarios
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.results import Content
-from lab.studies.study import Study
-from lab.studies.tables import markdown
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Options, Study, as_found
+from lab.engine.tables import markdown
 from lab.studies.targets.reference import (
     CHAMBERS,
     PERIODS,
@@ -198,14 +199,18 @@ def _firmware(report: dict[str, Any]) -> str:
     return "\n\n".join([said, markdown(rows), markdown(cycles)])
 
 
+def _tasks(options: Options) -> dict[Any, Task]:
+    return {name: Task(name, built, {"target": name}) for name in dict.fromkeys(options.target)}
+
+
 STUDY = Study(
-    (__name__, "agents.policy.controller"),
     {"target": TARGETS},
-    lambda options: {name: Task(name, built, {"target": name}) for name in dict.fromkeys(options.target)},
-    lambda _, found: dict(found),
+    _tasks,
+    as_found,
     {"speed": "control periods/s", "cycles": "1", "bytes": "B"},
     _shown,
     timed=True,
     allowed={"target": TARGETS},
     words={"target": "what is built; every: all loops as WebAssembly"},
 )
+register(study="targets", about="built code of every target, against Python")(STUDY)

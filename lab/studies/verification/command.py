@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from birthsim.command_line.settings import Configured
+from birthsim_env.registry import register
 from lab.studies.verification import balances, mutants, reached, report, sources
 
 
@@ -19,6 +20,7 @@ class Settings(Configured):
     """For mutation its report."""
 
 
+@register(study="verification", about="balances, coverage, mutation, for docs/verification.md")
 def main(options: Settings) -> None:
     """Measure, take or write."""
     if options.what == "balances":

@@ -16,9 +16,9 @@ from typing import Any
 
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each, Listed
+from lab.engine.results import MOST
 from lab.studies.mutation.modules import MODULES
 from lab.studies.mutation.uncompiled import SETTINGS, switch_off
-from lab.studies.results import MOST
 from lab.studies.verification import sources
 
 

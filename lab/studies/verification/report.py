@@ -4,8 +4,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from lab.engine.results import read_result
 from lab.studies.accuracy import tables as accuracy_tables
-from lab.studies.results import read_result
 from lab.studies.verification import mutants, sources
 
 PAGE = sources.ROOT / "docs" / "verification.md"

@@ -17,9 +17,10 @@ from birthsim.command_line.settings import Configured
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.values import shown
-from lab.studies.door import OWN, STUDIES
-from lab.studies.results import changed, read_result
-from lab.studies.study import Study
+from birthsim_env.registry import entry
+from lab.engine.door import OWN, studies
+from lab.engine.results import changed, read_result
+from lab.engine.study import Study
 
 DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md")
 ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
@@ -41,18 +42,18 @@ def main() -> None:
         perform_with(command, type("Settings", (Configured,), {"__doc__": does}), lambda _: action(), "")
     else:
         study = declared(name)
-        perform_with(command, study.settings(STUDIES[name].measures), partial(study.measure, name), "")
+        perform_with(command, study.settings(studies()[name].about), partial(study.measure, name), "")
 
 
 def declared(name: str) -> Study:
     """The declaration of a study."""
-    entry = STUDIES[name]
-    return cast(Study, getattr(import_module(f"lab.studies.{entry.module}"), entry.declaration))
+    import_module(f"lab.studies.{studies()[name].module}")
+    return cast(Study, entry("study", name).made)
 
 
 def names() -> list[str]:
     """The declared studies."""
-    return [name for name, entry in STUDIES.items() if entry.declaration]
+    return [name for name, study in studies().items() if not study.is_command]
 
 
 def state(name: str) -> str:
@@ -60,7 +61,7 @@ def state(name: str) -> str:
     study, content = declared(name), read_result(name)
     if content is None:
         return "not measured yet"
-    files = changed(content, study.code)
+    files = changed(content, study.measuring)
     listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
     usual = json.loads(json.dumps(study.options))
     other = {key: value for key, value in content["settings"].items() if key not in usual or value != usual[key]}

@@ -4,48 +4,53 @@ import json
 import platform
 import subprocess
 import sys
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from birthsim_env.physics.compiled.sources import ROOT, hashes
+from baselines.work.calls import called_by
+from birthsim_env.physics.compiled.sources import ROOT, source
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
 
 RESULTS = ROOT / "lab" / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
-ENGINE = (
-    "baselines/work/", "birthsim/command_line/", "baselines/about.py", "birthsim_env/files.py",
-    "birthsim_env/partials.py", "birthsim_env/physics/rig/json_reading.py", "birthsim_env/physics/rig/schema.py",
-    "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "birthsim_env/drawing/",
-    "baselines/figures/", "lab/studies/study.py", "lab/studies/results.py", "lab/studies/tables.py",
-)  # fmt: skip
-"""What reads options, keeps pieces, describes controllers and draws, and decides no figure. It makes no result stale."""
-
 Content = dict[str, Any]
 """What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there
-before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, ``figures``, and hashes of ``sources``."""
+before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, ``figures``, entries of the registry that were
+``used``, and ``sources``: of each definition that it called a hash, by file and name."""
 
 
 _SCHEMA = {
-    "date": str, "commit": str, "seconds": float, "settings": dict, "figures": (dict, list), "sources": Each(str),
+    "date": str, "commit": str, "seconds": float, "settings": dict, "figures": (dict, list), "sources": Each((str, dict)),
 }  # fmt: skip
 MOST = 2**26
 """Bytes of a result; the largest has a million."""
 
 
-def provenance(modules: tuple[str, ...]) -> Content:
-    """What makes a result now, whose figures ``modules`` measure; ``dirty`` if one of their sources is not as committed."""
-    sources = hashes(*modules)
+def beginning() -> Content:
+    """What makes a result that begins now; ``dirty`` are all files that are not as committed."""
+    other = _git("diff", "--name-only", "HEAD"), _git("ls-files", "--others", "--exclude-standard")
     return {
-        "command": " ".join(sys.argv), "commit": commit(),
-        "dirty": bool(_git("status", "--porcelain", "--", *sources)), "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": " ".join(sys.argv),
+        "commit": commit(),
+        "dirty": [path for paths in other for path in paths.splitlines()],
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "processor": _processor(),
         "versions": {"python": platform.python_version()} | {library: version(library) for library in LIBRARIES},
-        "sources": sources,
-    }  # fmt: skip
+    }
+
+
+def provenance(begun: Content, functions: Iterable[Callable[..., Any]], used: Mapping[str, str]) -> Content:
+    """What made a result, once all that ``functions`` used is known; ``dirty`` if a file that they call was."""
+    sources = dict[str, dict[str, str]]()
+    for place, code in _called(functions, used).items():
+        file, _, name = place.partition(":")
+        sources.setdefault(file, {})[name] = code
+    return {**begun, "dirty": any(path in sources for path in begun["dirty"]), "used": dict(used), "sources": sources}
 
 
 def commit() -> str:
@@ -64,10 +69,21 @@ def read_result(name: str, folder: Path | None = None) -> Content | None:
     return read_json("result", file, _SCHEMA, MOST) if file.is_file() else None
 
 
-def changed(content: Content, modules: tuple[str, ...]) -> list[str]:
-    """Sources of ``modules`` that changed or came since a result was measured, but for ``ENGINE``."""
-    then, now = content["sources"], hashes(*modules)
-    return sorted(path for path, code in now.items() if not path.startswith(ENGINE) and then.get(path) != code)
+def changed(content: Content, functions: Iterable[Callable[..., Any]]) -> list[str]:
+    """Definitions that changed or came since a result was measured by ``functions``.
+
+    Results from before definitions were followed have hashes of whole files; of these the files that changed are named.
+    """
+    then = content["sources"]
+    if "used" not in content:
+        return [path for path, code in then.items() if not (ROOT / path).is_file() or source(ROOT / path).code != code]
+    known = {f"{file}:{name}": code for file, names in then.items() for name, code in names.items()}
+    return [place for place, code in _called(functions, content["used"]).items() if known.get(place) != code]
+
+
+def _called(functions: Iterable[Callable[..., Any]], used: Mapping[str, str]) -> dict[str, str]:
+    """What ``called_by`` says, in hashes of 48 bits, which tell versions of one definition apart."""
+    return {place: code[:12] for place, code in called_by(functions, used).items()}
 
 
 def _lines(content: Any, indent: str = "\n") -> str:

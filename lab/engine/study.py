@@ -12,14 +12,31 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from baselines.work.tasks import Result, Task, run_tasks
+from baselines.work.asked import asked
+from baselines.work.tasks import Result, Task, is_kept, run_tasks
 from birthsim.command_line.settings import EPISODES, MANY, Processes, number, whole
 from birthsim_env.files import own_folder, whole_results, write_text
 from birthsim_env.physics.compiled.sources import ROOT
-from lab.studies.results import RESULTS, Content, provenance, written
+from lab.engine.results import RESULTS, Content, beginning, provenance, written
 
 Options = SimpleNamespace
 Found = Mapping[Any, Result]
+
+
+def as_found(options: Options, found: Found) -> Any:
+    """Of a study whose values are its pieces' results by key."""
+    return dict(found)
+
+
+def the_only_one(options: Options, found: Found) -> Any:
+    """Of a study with one piece."""
+    (result,) = found.values()
+    return result
+
+
+def no_texts(content: Content) -> dict[str, str]:
+    """Of a study that is shown by pictures alone."""
+    return {}
 
 
 def no_pictures(content: Content, folder: Path) -> list[Path]:
@@ -41,22 +58,24 @@ def no_files(options: Options, found: Found, folder: Path) -> list[str]:
 class Study:
     """What is run, over which grid, what is kept of it, and how it is shown.
 
-    ``code`` names the modules that measure, also what they find by an entry point: a result is fresh while their code is as it
-    was. ``options`` has the default
-    of each option; a tuple takes several values. ``tasks(options)`` are the pieces by key, ``keep(options, results by key)``
-    the figures, as JSON takes them, whose ``units`` are given by column. ``show(result)`` are the texts that stand in
-    ``docs/data``, by file name; ``draw(result, folder)`` writes pictures. With ``partial`` some pieces may fail; ``timed``
-    pieces are measured anew, one after another. ``allowed`` has the values of options that take no others, ``words`` the help
-    of what its name does not say; the option ``first`` needs no name. ``further(options, results by key)`` are pieces that
-    others suggest, until there are none; ``write(options, results by key, folder)`` writes more files and names them.
+    ``options`` has the default of each option; a tuple takes several values. ``tasks(options)`` are the pieces by key,
+    ``keep(options, results by key)`` the figures, as JSON takes them, whose ``units`` are given by column. ``show(result)`` are
+    the texts that stand in ``docs/data``, by file name; ``draw(result, folder)`` writes pictures. With ``partial`` some pieces
+    may fail; ``timed`` pieces are measured anew, one after another. ``allowed`` has the values of options that take no others,
+    ``words`` the help of what its name does not say; the option ``first`` needs no name. ``further(options, results by key)``
+    are pieces that others suggest, until there are none; ``write(options, results by key, folder)`` writes more files and names
+    them.
+
+    A result is fresh while all that ``tasks``, ``keep`` and ``further`` call is as it was, what they call by name, and the
+    entries of the registry that they asked for. ``beside`` are functions and classes that measure too, but that none of them
+    names, such as an environment of ``agents`` that is made by its id.
     """
 
-    code: tuple[str, ...]
     options: dict[str, Any]
     tasks: Callable[[Options], dict[Any, Task]]
-    keep: Callable[[Options, Found], Any]
-    units: dict[str, str]
-    show: Callable[[Content], dict[str, str]]
+    keep: Callable[[Options, Found], Any] = as_found
+    units: dict[str, str] = field(default_factory=dict)
+    show: Callable[[Content], dict[str, str]] = no_texts
     draw: Callable[[Content, Path], list[Path]] = no_pictures
     partial: bool = False
     timed: bool = False
@@ -65,6 +84,12 @@ class Study:
     first: str = ""
     further: Callable[[Options, Found], dict[Any, Task]] = no_more
     write: Callable[[Options, Found, Path], list[str]] = no_files
+    beside: tuple[Callable[..., Any], ...] = ()
+
+    @property
+    def measuring(self) -> tuple[Callable[..., Any], ...]:
+        """The functions whose code decides what is kept."""
+        return (self.tasks, self.keep, self.further, *self.beside)
 
     def settings(self, measures: str) -> type[Processes]:
         """Its options as a command's settings, whose help says what it ``measures``."""
@@ -89,9 +114,9 @@ class Study:
         with ExitStack() as stack:
             folder = stack.enter_context(own_folder(settings.out or ROOT / "out" / "studies" / name))
             place = Path(stack.enter_context(tempfile.TemporaryDirectory())) if self.timed else folder
-            made = provenance(self.code)
+            begun = beginning()
             while more:
-                kept += sum((place / task.file()).is_file() for task in more.values())
+                kept += sum(is_kept(task, place) for task in more.values())
                 each = {task.name: task for task in more.values()}
                 done, failed = run_tasks(list(each.values()), place, jobs, name, settings.cluster)
                 tasks, failures = tasks | more, failures | failed
@@ -102,9 +127,15 @@ class Study:
                 raise ValueError(problem)
             figures = self.keep(options, found)
             content = {
-                **made, "seconds": round(time.perf_counter() - began, 1), "pieces": len(tasks), "pieces_kept": kept,
-                "failed": failures, "settings": vars(options), "units": self.units, "figures": figures,
-            }  # fmt: skip
+                **provenance(begun, self.measuring, asked()),
+                "seconds": round(time.perf_counter() - began, 1),
+                "pieces": len(tasks),
+                "pieces_kept": kept,
+                "failed": failures,
+                "settings": vars(options),
+                "units": self.units,
+                "figures": figures,
+            }
             content = json.loads(written(content))
             texts = self.show(content)
             with whole_results(folder) as whole:

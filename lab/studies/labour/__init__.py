@@ -1,1 +1,0 @@
-"""A small biomechanical model of the second stage of labour."""
