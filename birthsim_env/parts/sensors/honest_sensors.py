@@ -1,6 +1,6 @@
 """Sensors with the errors that data sheets and laboratories know: the sensor model ``honest``.
 
-Figures, their basis and the ranges that are drawn from are fields of ``physics.electronics``.
+Parameters, their sources and the ranges that are drawn from are declared in ``physics.electronics``.
 """
 
 import math
