@@ -1,6 +1,6 @@
 """Options of the plant: a supply behind a line, tubes between valves and chambers, a handle on a flexible structure.
 
-Each is off where its figure is 0 (``supply_conductance``, ``tube_length``, ``mode_frequency``). Plants without any run the
+Each is off where its parameter is 0 (``supply_conductance``, ``tube_length``, ``mode_frequency``). Plants without any run the
 kernels of ``dynamics``, which know none of them. With an option the state has further rows:
 
 - the pressure Ps in a reservoir of volume V, isothermal, which the valves draw from and an ISO 6358 line fills from the source:

@@ -1,7 +1,7 @@
 """Elementary functions from + - * / and whole numbers alone: the same bits on every processor.
 
 The C library chooses its ``exp``, ``log``, ``sin`` and ``cos`` by the processor, NumPy its own, and they differ in the last
-bit; after some seconds of dry friction so does the figure in a table. Everything that decides an episode therefore calls
+bit; after some seconds of dry friction so does the number in a table. Everything that decides an episode therefore calls
 these, from kernels and from Python. Errors, against 40 digits, are below one unit in the last place where nothing else is
 said (`tests/physics/compiled/test_exact.py`). Sources: argument reduction of Cody and Waite (1980), Taylor series.
 """
