@@ -19,12 +19,17 @@ class FreeParameter(NamedTuple):
 
 LATENCY = "electronics.position_latency"
 
-ORDER = ("cylinder1", "cylinder2", "friction", "mechanics", "valves", "chambers", "air", "electronics", "geometry")
-"""Sections in the order in which estimates are shown."""
+ORDER = ("cylinder1", "cylinder2", "friction", "mechanics", "valves", "chambers")
+"""Sections in the order in which estimates are shown; others come behind."""
+
+
+def _place(section: str) -> int:
+    return (*ORDER, section).index(section)
+
 
 FREE_PARAMETERS = tuple(
     FreeParameter(name, one.identified)
-    for name, one in sorted(DECLARED.items(), key=lambda item: ORDER.index(item[0].partition(".")[0]))
+    for name, one in sorted(DECLARED.items(), key=lambda item: _place(item[0].partition(".")[0]))
     if one.identified
 )
 """What is identified: the parameters that are declared so."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from birthsim_env.physics.rig.declaration import Prior, Section, parameter
 
-NO_LARGER = "an episode draws within +-"
+EITHER_WAY = "an episode draws up to this either way"
 
 SLOWEST = 40.0
 """Hz, of an acceleration sensor. In eight drawn circles with ``honest`` sensors ``admittance-adaptive`` is as good with 40 Hz
@@ -66,7 +66,7 @@ class Electronics(Section, plant=False, shared=True):
     )
     force_bias: float = parameter(
         "N",
-        f"drift of the force sensor since it was tared; {NO_LARGER}",
+        f"drift of the force sensor since it was tared; {EITHER_WAY}",
         default=1.0,
         source="assumed",
         least=0,
@@ -76,7 +76,7 @@ class Electronics(Section, plant=False, shared=True):
     )
     force_gain_error: float = parameter(
         "-",
-        f"uncertainty of the force sensor's calibration; {NO_LARGER}",
+        f"uncertainty of the force sensor's calibration; {EITHER_WAY}",
         default=0.01,
         source="assumed",
         least=0,
@@ -86,7 +86,7 @@ class Electronics(Section, plant=False, shared=True):
     )
     force_crosstalk: float = parameter(
         "-",
-        f"share of the other axis in a force; {NO_LARGER}",
+        f"share of the other axis in a force; {EITHER_WAY}",
         default=0.01,
         source="assumed, below 2 % in good six-axis sensors",
         least=0,
@@ -149,7 +149,7 @@ class Electronics(Section, plant=False, shared=True):
     )
     position_scale_error: float = parameter(
         "-",
-        f"error of the tracker's scale; {NO_LARGER}",
+        f"error of the tracker's scale; {EITHER_WAY}",
         default=0.005,
         source="assumed",
         least=0,
@@ -182,7 +182,7 @@ class Electronics(Section, plant=False, shared=True):
 
     pressure_bias: float = parameter(
         "Pa",
-        f"bias of a pressure cell; {NO_LARGER}",
+        f"bias of a pressure cell; {EITHER_WAY}",
         default=2000.0,
         source="assumed, 0.2 % of a cell of 10 bar",
         least=0,
@@ -257,7 +257,7 @@ class Electronics(Section, plant=False, shared=True):
     )
     acceleration_bias: float = parameter(
         "m/s2",
-        f"bias of the acceleration sensor, and of gravity that was taken off; {NO_LARGER}",
+        f"bias of the acceleration sensor, and of gravity that was taken off; {EITHER_WAY}",
         default=0.1,
         source="assumed",
         least=0,
@@ -266,7 +266,7 @@ class Electronics(Section, plant=False, shared=True):
     )
     acceleration_gain_error: float = parameter(
         "-",
-        f"error of the acceleration sensor's gain per axis; {NO_LARGER}",
+        f"error of the acceleration sensor's gain per axis; {EITHER_WAY}",
         default=0.01,
         source="assumed",
         least=0,

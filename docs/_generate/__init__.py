@@ -1,6 +1,6 @@
 """Parts of the site that come from code: each function of ``PARTS`` returns the Markdown of one file.
 
-`make docs` writes them into out/docs-generated, and the pages of docs/reference include them.
+`make docs` writes them into out/docs-generated, and pages include them.
 """
 
 from functools import partial
@@ -14,7 +14,7 @@ from _generate.metrics import metrics
 from _generate.page import page
 from _generate.pictures import pictures
 from _generate.readers import readers
-from _generate.rig import rig
+from _generate.rig import options, rig
 from _generate.root_pages import PAGES, root_page
 from _generate.stages import stage
 
@@ -27,6 +27,7 @@ PARTS = {
     "controllers.md": controllers,
     "environments.md": environments,
     "metrics.md": metrics,
+    "options.md": options,
     "page.md": page,
     "readers.md": readers,
     "rig.md": rig,

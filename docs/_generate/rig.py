@@ -1,9 +1,9 @@
-"""The rig's parameters: a table for every section of ``Parameters``."""
+"""The rig's parameters: a table for every section of ``Parameters``, and one of the plant's options."""
 
 import math
 
 from birthsim_env.physics.rig.declaration import LISTED, Parameter, Section
-from birthsim_env.physics.rig.parameters import SECTIONS
+from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS
 
 
 def rig() -> str:
@@ -13,14 +13,28 @@ def rig() -> str:
 
 def _section(name: str, part: Section) -> str:
     about = (type(part).__doc__ or "").partition(f"\n\n{LISTED}")[0].replace("\n    ", "\n")
-    head = ["parameter", "default", "unit", "allowed", "drawn from", "meaning", "source"]
-    lines = [f"## `{name}`", "", about, "", f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    rows = [["parameter", "default", "unit", "allowed", "drawn from", "meaning", "source"]]
     for own, one in part.parameters.items():
         value = getattr(part, own)
         shown = f"`{value!r}`" if isinstance(value, str) else f"{value:.6g}"
-        cells = [f"`{own}`", shown, one.unit.removeprefix("-"), _allowed(one), _drawn(one), one.about, one.source]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([f"`{own}`", shown, one.unit.removeprefix("-"), _allowed(one), _drawn(one), one.about, one.source])
+    return f"## `{name}`\n\n{about}\n\n{_table(rows)}"
+
+
+def options() -> str:
+    """A table of the parameters that are drawn on request only."""
+    rows = [["parameter", "default", "unit", "drawn from, on request", "meaning", "source"]]
+    for name, one in DECLARED.items():
+        if one.range and one.on_request:
+            low, high = one.range
+            drawn = f"{low:g} to {high:g}"
+            rows.append([f"`{name}`", f"{one.default:g}", one.unit.removeprefix("-"), drawn, one.about, one.source])
+    return _table(rows)
+
+
+def _table(rows: list[list[str]]) -> str:
+    head, *others = (f"| {' | '.join(cells)} |" for cells in rows)
+    return "\n".join([head, f"|{'---|' * len(rows[0])}", *others])
 
 
 def _allowed(one: Parameter) -> str:

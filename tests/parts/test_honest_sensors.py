@@ -1,7 +1,6 @@
 """The sensor model ``honest``: every error against statistics, closed forms or what ``lab`` shows, and all of them off."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.sensors.honest import HonestSensors
 from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
-from birthsim_env.physics.electronics import Electronics
-from tests.console import ROOT
 
 LAB = ("position_noise", "position_latency", "pressure_noise")
 OFF = {name: 0.0 for name in SENSOR_PARAMETERS if name not in (*LAB, "distortion_length")}
@@ -237,14 +234,3 @@ def test_ranges_are_drawn_for_every_episode_and_the_latest_arrives():
     # The board knows of no latency here, and stamps samples with the instant at which they arrive.
     assert (0.199 - seen["position_time"][-1]).max() < 0.001 + 1e-9
     assert abs(np.corrcoef(late, old)[0, 1]) < 0.6
-
-
-def test_the_page_has_every_figure_with_its_default_and_its_range():
-    page = (ROOT / "docs" / "environments.md").read_text(encoding="utf-8")
-    rows = dict(re.findall(r"^\| `(\w+)` \| (.*)$", page, re.MULTILINE))
-    for name, one in Electronics.parameters.items():
-        if name != "control_period":
-            default, drawn = rows[name].split(" | ")[:2]
-            assert float(default.split()[0]) == one.default, name
-            low_high = tuple(float(bound) for bound in drawn.split(" to ")) if drawn.strip() else None
-            assert low_high == (None if one.on_request else one.range), name

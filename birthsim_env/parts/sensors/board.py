@@ -1,7 +1,7 @@
 """What a control board reads of a force sensor, a tracker, pressure cells and an accelerometer, each with its errors.
 
-The sensor models ``lab`` and ``honest`` are such boards. Parameters, their basis and their ranges are fields of
-``physics.electronics``.
+The sensor models ``lab`` and ``honest`` are such boards. Parameters, their sources and the ranges that are drawn from are
+declared in ``physics.electronics``.
 """
 
 import math

@@ -7,14 +7,14 @@ from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 from lab.studies.comparison.grid import as_described
 
 OFF = 0.05
-"""Fraction by which figures of a known rig are off at most; ``birthsim identify`` leaves as much of friction after 5 s."""
+"""Fraction by which parameters of a known rig are off at most; ``birthsim identify`` leaves as much of friction after 5 s."""
 
 PLANTS = ("nominal", "randomised")
 """The rig is as believed, or drawn from the documented ranges while the default is believed."""
 
 
 def believed(rig: Parameters, plant: str) -> Parameters:
-    """What a controller believes, with the ranges from which the true rigs are drawn. Sensors have the figures of ``rig``."""
+    """What a controller believes, with the ranges from which true rigs are drawn. Sensors have the parameters of ``rig``."""
     described = as_described(rig)
     if plant == "randomised":
         return described
@@ -23,7 +23,7 @@ def believed(rig: Parameters, plant: str) -> Parameters:
 
 
 def around(rig: Parameters, name: str, off: float) -> tuple[float, float]:
-    """The range of the figure ``name`` within a fraction ``off`` of the rig's, in what is allowed of it."""
+    """The range of the parameter ``name`` within a fraction ``off`` of the rig's, in what is allowed of it."""
     value, declared = value_of(rig, name), DECLARED[name]
     return max(declared.least, (1 - off) * value), min(declared.most, (1 + off) * value)
 

@@ -1,8 +1,6 @@
 """Options of the plant: against the second model with a reservoir and a second body, closed forms, the plain plant."""
 
 import math
-import re
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -205,11 +203,3 @@ def test_every_range_can_be_drawn_and_none_is_unless_it_is_named():
     assert "deadband" not in nominal.to_dict()["valves"], "no stored rig changes"
     assert options.are_off(Plant().lane_parameters)
     assert Parameters.from_dict(nominal.replace(EACH["all"]).to_dict()) == nominal.replace(EACH["all"])
-
-
-def test_the_page_has_every_option_with_its_default_and_its_range():
-    page = (Path(__file__).parents[3] / "docs" / "plant_options.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\|[^|]*\| `([\w.]+)` \| ([^| ]+)[^|]*\| (\S+) to (\S+) \|", page, re.MULTILINE)
-    assert {name: (float(low), float(high)) for name, _, low, high in rows} == WORTH
-    for name, default, *_ in rows:
-        assert float(default) == DECLARED[name].default, name

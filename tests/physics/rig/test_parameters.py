@@ -10,18 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from birthsim_build.fmu.description import exponents
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
 from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, load_parameters, parameter_of, value_of
 from tests.physics.rigs import LAWS
-
-UNITS = {"m", "rad", "N", "N s/m", "kg", "m/s2", "N/m", "s/m", "m/s", "-", "m3", "W/(m2 K)", "W/K", "m3/(s Pa)", "s", "Pa", "K"}
-UNITS |= {"J/(kg K)", "kg/m3", "Hz"}
 
 
 def test_every_parameter_has_unit_meaning_source_and_a_line_in_the_docstring() -> None:
     for dotted, one in DECLARED.items():
         section, _, name = dotted.partition(".")
-        assert one.unit in UNITS, dotted
+        exponents(one.unit)  # of SI units
         assert min(len(one.about), len(one.source)) >= 4, dotted
         lines = (SECTIONS[section].__doc__ or "").splitlines()
         found = [f"({one.unit}): {one.about}; {one.source}" in line for line in lines if line.startswith(f"- ``{name}``")]
