@@ -146,7 +146,7 @@ def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], 
     """Figures of the rig and its sensors in world ``seed``; its push, N, and the way that it asks for, mm."""
     env: Any = gymnasium.make_vec(ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True)
     env.reset(seed=[seed])
-    shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "figures", {}).items()}
+    shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "parameters", {}).items()}
     simulation = env.simulation
     simulation.run(round((REST + PUSHED / 2) / simulation.period))
     force, target = simulation.force, simulation.reference.position
