@@ -8,7 +8,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.physics.compiled.lanes import parameter_column
+from birthsim_env.physics.compiled.lanes import MASS, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.honest import search, worst
 
@@ -59,7 +59,7 @@ def test_a_search_finds_the_corner_in_which_a_size_is_largest():
 def test_a_world_is_told_as_the_environment_draws_it():
     env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=1, randomize=True, sensors="honest", policy_period=0.5)
     env.reset(seed=[SEED])
-    mass = env.simulation.plant.lane_parameters[8, 0]
+    mass = env.simulation.plant.lane_parameters[MASS, 0]
     noise = env.simulation.sensors.parameters["position_noise"][0]
     for _ in range(9):
         info = env.step(np.zeros((1, 4), dtype=np.float32))[4]

@@ -61,7 +61,7 @@ class HonestSensors(BoardSensors):
 
     @property
     def parameters(self) -> dict[str, Array]:
-        """Figure -> what the episode of each lane has, (N,)."""
+        """Parameter -> what the episode of each lane has, (N,)."""
         return dict(zip(SENSOR_PARAMETERS, Errors(self._errors).parameters.rows, strict=True))
 
     @property
