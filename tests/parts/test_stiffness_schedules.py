@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from birthsim_env import StiffnessSchedule
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.parts.scenarios import find_scenario, studied_scenarios
 from birthsim_env.registry import names
 from tests.parts.test_moving_hands import minimum_jerk
 
@@ -71,16 +71,26 @@ def test_three_PHASES_each_go_on_from_the_one_before():
     np.testing.assert_allclose(rows[0], (1e3, 2e3, 2e3, 3e3, 3e3, 3e3))
 
 
-@pytest.mark.parametrize("name", names("scenario"))
-def test_varied_schedules_draw_inside_the_feasible_range(name):
-    # Feasible at mid stroke are 2400-5500 N/m on cylinder 1 and 1200-2800 N/m on cylinder 2.
-    schedule, lanes = find_scenario(name).varied()[2], 300
+def varied_rows(name, lanes=300):
+    """What a scenario's varied schedule asks for at 200 instants, (200, 7, lanes)."""
+    schedule = find_scenario(name).varied()[2]
     schedule.prepare(lanes)
     for lane in range(lanes):
         schedule.begin(lane, stream(lane, 0, "stiffness"))
-    rows = np.stack([schedule.sample(np.full(lanes, t)) for t in np.linspace(0, find_scenario(name).duration, 200)])
+    return np.stack([schedule.sample(np.full(lanes, t)) for t in np.linspace(0, find_scenario(name).duration, 200)])
+
+
+@pytest.mark.parametrize("name", names("scenario"))
+def test_varied_schedules_stay_inside_the_feasible_range(name):
+    # Feasible at mid stroke are 2400-5500 N/m on cylinder 1 and 1200-2800 N/m on cylinder 2.
+    rows = varied_rows(name)
     for row, low, high in ((0, 1000, 5000), (1, 1000, 5000), (2, 2400, 5500), (3, 1200, 2800)):
         assert low <= rows[:, row].min() <= rows[:, row].max() <= high
+
+
+@pytest.mark.parametrize("name", studied_scenarios())
+def test_schedules_of_studies_are_drawn_and_alike_on_both_axes(name):
+    rows = varied_rows(name, 20)
     assert np.ptp(rows[-1, 2]) > 0
     np.testing.assert_array_equal(rows[:, 0], rows[:, 1])
 

@@ -1,0 +1,15 @@
+"""Encoders: positions are whole steps, no more than half a step off."""
+
+import gymnasium
+import numpy as np
+from birthsim_env.parts.sensors.encoder import STEP
+
+
+def test_positions_are_whole_steps_and_near_the_true_ones():
+    env = gymnasium.make("BirthSIM/Circle-v1", sensors="encoder").unwrapped
+    env.reset(seed=0)
+    for _ in range(50):
+        env.step(np.zeros(4, np.float32))
+        seen, true = env.measurement.position, env.simulation.motion[:2, 0]
+        np.testing.assert_allclose(seen / STEP, np.round(seen / STEP), atol=1e-6)
+        assert np.abs(seen - true).max() <= 0.5001 * STEP
