@@ -24,7 +24,7 @@ RIG = Parameters()
 def imports(monkeypatch):
     """Plugins are imported by their names, as a user's are; what they register is gone after a test."""
     assert all(registry.names(kind) for kind in KINDS), "all of the package's own are there"
-    tables = *(registry._ENTRIES[kind] for kind in KINDS), registry._WHERE, gymnasium.registry
+    tables = *(registry._ENTRIES[kind] for kind in KINDS), gymnasium.registry
     kept = [dict(table) for table in tables]
     monkeypatch.syspath_prepend(PLUGINS)
     yield
