@@ -100,12 +100,12 @@ def _policies(path: str | None) -> tuple[list[Path], list[str], set[str]]:
     if path is None:
         return [], [], set()
     try:
-        from agents.policy.files import load_policy
+        from agents.policy.files import read_policy
         from agents.policy.seeds import policy_folders
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: {installation('agents')}") from error
     folders = policy_folders(path)
-    policies = [load_policy(folder) for folder in folders]
+    policies = [read_policy(folder) for folder in folders]
     laws = dict.fromkeys(policy.settings.law for policy in policies)
     trained = {str(policy.training["sensors"]) for policy in policies if "sensors" in policy.training}
     return folders, [law for law in laws if law != NO_LAW], trained

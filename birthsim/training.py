@@ -157,7 +157,7 @@ def plan(
     training = override(training, **given, **{name: value for name, value in changes.items() if name not in own})
     rig = load_parameters(parameters)
     for name, hand in training.worlds():
-        check_environment(name, residual=True)
+        check_environment(name, residual=True, given="environment =")
         check_world(name, parameters=rig, randomize=training.randomize, sensors=training.sensors, **hand)
     return Plan(training, residual, rig, tuple(range(training.seed, training.seed + seeds)), jobs, make_folder(out))
 

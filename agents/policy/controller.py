@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.policy.network import PolicyNetwork
 from agents.policy.seeds import best_policy
 from agents.policy.stage import policy_stage
@@ -106,7 +106,7 @@ class ResidualController(CorrectedController):
 
 def _stored(place: str | Path) -> tuple[PolicyNetwork, ResidualSettings]:
     """The network of a folder and its settings."""
-    stored = load_policy(best_policy(place))
+    stored = read_policy(best_policy(place))
     network, seen, said = stored.network, len(observation_names(stored.settings)), stored.settings.size
     if (network.inputs, network.outputs) != (seen, said):
         raise ValueError(

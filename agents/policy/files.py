@@ -71,7 +71,7 @@ def save_policy(policy: Policy | bytes, folder: Path) -> None:
         file.write(policy if isinstance(policy, bytes) else policy_content(policy))
 
 
-def load_policy(folder: str | Path) -> Policy:
+def read_policy(folder: str | Path) -> Policy:
     """Read a policy folder; raises ``ValueError`` that says what is missing, damaged or foreign."""
     folder = Path(folder)
     allowed = f"allowed: a folder that birthsim train wrote, with {WEIGHTS}"

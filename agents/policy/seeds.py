@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.files import WEIGHTS, Policy
-from agents.policy.files import load_policy as read_policy
+from agents.policy.files import WEIGHTS, Policy, read_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, jsonable, penalize_lost, quantile

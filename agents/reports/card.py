@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import penalize_lost, quantile
@@ -44,7 +44,7 @@ def compared(folder: Path) -> list[Evaluation]:
 
     All meet the same worlds, of the kind that its training had. Raises ``ValueError`` where the training left no settings.
     """
-    policy = load_policy(folder)
+    policy = read_policy(folder)
     about = settings_of(folder)
     try:
         sensors, randomize, rig = about["sensors"], about["randomize"], Parameters.from_dict(about["rig"])
@@ -64,7 +64,7 @@ def compared(folder: Path) -> list[Evaluation]:
 
 def model_card(folder: Path, name: str, evaluations: Sequence[Evaluation]) -> str:
     """The text of ``README.md`` beside a policy, from what ``compared`` found."""
-    policy = load_policy(folder)
+    policy = read_policy(folder)
     about = settings_of(folder)
     whom, columns = [one.controller for one in evaluations], [metrics(one) for one in evaluations]
     rows = {key: [column[key] for column in columns] for key in METRICS if np.isfinite(columns[0][key])}

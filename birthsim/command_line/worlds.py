@@ -9,13 +9,16 @@ from baselines.registry import known_options, split_options
 from birthsim_env.physics.rig.values import near
 
 
-def check_environment(name: str, residual: bool = False) -> None:
-    """Raises ``ValueError`` for an id that is none of the experiments, or else of those with a law inside."""
+def check_environment(name: str, residual: bool = False, given: str = "--env") -> None:
+    """Raises ``ValueError`` for an id that is none of the experiments, or else of those with a controller inside.
+
+    ``given`` says by what it was given: an option of a command, or ``"environment ="``.
+    """
     known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and ("Residual" in one) == residual)
     if name not in known:
         whole = f"BirthSIM/{name}"
         asked = near(whole if whole in known else name, known)
-        raise ValueError(f"--env {name!r}{asked}; allowed: {', '.join(known)}")
+        raise ValueError(f"{given} {name!r}{asked}; allowed: {', '.join(known)}")
 
 
 def check_world(environment: str, **arguments: Any) -> None:

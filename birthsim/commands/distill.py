@@ -18,7 +18,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.schema import fault
 
 try:
-    from agents.policy.files import Policy, load_policy, save_policy
+    from agents.policy.files import Policy, read_policy, save_policy
     from agents.reports.learning_curves import learning_curves
     from agents.training.student import Lessons, teach
     from agents.training.validation import merit
@@ -60,7 +60,7 @@ def main(settings: Settings) -> None:
     for k in range(settings.seeds):
         lessons = Lessons(settings.hidden, settings.rounds, settings.seed + k)
         place = settings.teacher / f"seed_{lessons.seed}"
-        teacher = load_policy(place)
+        teacher = read_policy(place)
         if not teacher.training.get("privileged", False):
             raise ValueError(f"--teacher: {str(place)!r} is not privileged; allowed: policies trained with privileged = true")
         if problem := fault(teacher.training, TAUGHT, "training"):

@@ -32,7 +32,7 @@ def main(settings: Settings) -> None:
     """Compute, draw and write it."""
     try:
         from agents.policy.controller import ResidualController
-        from agents.policy.files import load_policy
+        from agents.policy.files import read_policy
         from agents.policy.seeds import policy_folders
         from agents.reports import inspection
         from agents.reports.correction_figure import draw_corrections
@@ -43,7 +43,7 @@ def main(settings: Settings) -> None:
     from birthsim_env.physics.rig.parameters import Parameters
 
     places = policy_folders(settings.policy)
-    policies = [load_policy(place) for place in places]
+    policies = [read_policy(place) for place in places]
     if any(policy.settings.law == NO_LAW for policy in policies):
         raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a controller")
     names = [place.name for place in places]

@@ -52,9 +52,12 @@ class Settings:
 
 def main(settings: Settings) -> None:
     """Train every seed and report; what that needs takes seconds to load."""
+    from birthsim.command_line.worlds import check_environment
     from birthsim.training import carry_out, plan, report
     from birthsim_env.parts.drawn.randomization import described
 
+    if settings.env is not None:
+        check_environment(settings.env, residual=True)
     said = {
         "environment": settings.env,
         "randomize": None if settings.randomize is None else RANDOMIZE[settings.randomize],

@@ -63,13 +63,13 @@ def _write_folder(settings: Settings) -> None:
 def _write_file(settings: Settings) -> None:
     try:
         # PyTorch takes seconds to load; it and the rest come with extras only.
-        from agents.policy.files import load_policy
+        from agents.policy.files import read_policy
         from agents.policy.onnx_export import TOLERANCE, export_onnx
         from agents.policy.seeds import best_policy
     except ImportError as error:
         raise ValueError(f"{error}; exporting needs the extras agents and onnx: {installation('agents', 'onnx')}") from error
     folder = best_policy(settings.policy)
-    policy = load_policy(folder)
+    policy = read_policy(folder)
     path = settings.out or folder / f"policy.{settings.to}"
     exported = export_onnx(policy, path)
     print(f"{path}: {exported.size} bytes, {policy.network.inputs} observation entries to {policy.network.outputs} actions")

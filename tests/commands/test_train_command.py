@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.training.checkpoint import NAME as CHECKPOINT
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
 
@@ -16,7 +16,7 @@ def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_pa
     assert [path.name for path in folder.iterdir()] == ["seed_3"]
     own = folder / "seed_3"
     assert {path.name for path in own.iterdir()} - {".lock"} == {WEIGHTS, CHECKPOINT, "training.json", "tensorboard"}
-    reached, policy = strict(own / "training.json"), load_policy(own)
+    reached, policy = strict(own / "training.json"), read_policy(own)
     assert policy.training["reached"] == reached["policy"]
     assert (policy.environment, policy.settings.authority, policy.training["seed"]) == (RESIDUAL, 60.0, 3)
     assert (reached["settings"]["steps"], reached["settings"]["authority"], reached["settings"]["lanes"]) == (4096, 60.0, 32)
@@ -105,4 +105,4 @@ def test_ctrl_c_during_training_keeps_the_best_policies_and_the_checkpoints(jobs
     assert jobs == 2 or "interrupted after" in printed
     assert jobs == 2 or f"policy and checkpoint are kept in {tmp_path}/seed_0/" in printed
     for folder in folders:
-        assert load_policy(folder).environment == RESIDUAL
+        assert read_policy(folder).environment == RESIDUAL

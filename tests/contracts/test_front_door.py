@@ -54,7 +54,7 @@ def registered():
     yield
     for kind, names in known.items():
         for name in set(registry.names(kind)) - names:
-            del registry._ENTRIES[kind][name], registry._WHERE[kind, name]
+            del registry._ENTRIES[kind][name]
 
 
 @pytest.mark.usefixtures("registered")

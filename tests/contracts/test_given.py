@@ -12,7 +12,7 @@ import pytest
 import torch
 
 import birthsim_env
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.policy.seeds import best_policy, policy_folders
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration
@@ -165,7 +165,7 @@ def test_a_path_is_text_or_pathlike(files):
         make_controller(path(f"{own}:law"), path(files / "rig.toml"))
         birthsim_env.Plant(path(files / "rig.toml"))
         assert len(policy_folders(path("circle"))) == 5
-        load_policy(path(best_policy(path("circle"))))
+        read_policy(path(best_policy(path("circle"))))
         load_configuration(path("circle"))
     for use in (load_parameters, policy_folders, load_configuration, Parameters.from_toml):
         for wrong in (3, True, b"rig.toml", 1.5, ["rig.toml"]):

@@ -7,7 +7,7 @@ import pytest
 from safetensors.numpy import save
 
 from agents.policy.controller import ResidualController
-from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
+from agents.policy.files import FORMAT, WEIGHTS, Policy, read_policy, save_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from tests.residual.policies import ENVIRONMENT, INPUTS, POLICIES, SETTINGS, Trap, network
@@ -25,7 +25,7 @@ def rewrite(folder, arrays=None, about=None):
 
 def assert_refused(folder, message):
     with pytest.raises(ValueError, match=message) as caught:
-        load_policy(folder)
+        read_policy(folder)
     assert repr(str(folder)) in str(caught.value)
     assert "allowed: " in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -39,7 +39,7 @@ def test_a_folder_without_a_policy_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "empty").mkdir()
     for name in ("file", "empty", "nowhere"):
-        for read in (load_policy, lambda folder: ResidualController(policy=folder)):
+        for read in (read_policy, lambda folder: ResidualController(policy=folder)):
             with pytest.raises(ValueError, match=r"; allowed: a folder that birthsim train wrote") as caught:
                 read(tmp_path / name)
             assert repr(str(tmp_path / name)) in str(caught.value)
@@ -147,7 +147,7 @@ def test_arrays_that_are_no_network_are_refused(folder, kind, changes):
 @pytest.mark.parametrize(("inputs", "outputs"), [(22, 2), (INPUTS, 4), (INPUTS - 1, 3)])
 def test_a_network_of_another_task_is_refused_by_the_controller(tmp_path, inputs, outputs):
     save_policy(Policy(network(inputs, outputs), ENVIRONMENT, SETTINGS, {}), tmp_path)
-    assert load_policy(tmp_path).network.inputs == inputs
+    assert read_policy(tmp_path).network.inputs == inputs
     with pytest.raises(ValueError, match=rf"maps {inputs} to {outputs} numbers; allowed: {INPUTS} to 2") as caught:
         ResidualController(policy=tmp_path)
     assert repr(str(tmp_path)) in str(caught.value)

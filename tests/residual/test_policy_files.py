@@ -11,7 +11,7 @@ import pytest
 from safetensors import safe_open
 from safetensors.numpy import load
 
-from agents.policy.files import FORMAT, WEIGHTS, load_policy, save_policy
+from agents.policy.files import FORMAT, WEIGHTS, read_policy, save_policy
 from tests.console import ROOT
 from tests.residual.policies import ENVIRONMENT, POLICIES, network, policy
 
@@ -22,7 +22,7 @@ KINDS = {**POLICIES, "squashed": policy(squashed=True), "eleven layers": policy(
 @pytest.mark.parametrize("written", KINDS.values(), ids=KINDS)
 def test_a_round_trip_is_exact(tmp_path, written):
     save_policy(written, tmp_path)
-    read = load_policy(str(tmp_path))
+    read = read_policy(str(tmp_path))
     assert sorted(path.name for path in tmp_path.iterdir()) == [WEIGHTS]
     assert replace(read, network=None) == replace(written, network=None)
     assert (len(read.network.memory), read.network.squashed) == (len(written.network.memory), written.network.squashed)
@@ -46,8 +46,8 @@ def test_others_read_arrays_and_json(tmp_path):
 
 def test_the_same_policy_is_the_same_bytes_in_another_process(folder):
     program = (
-        "import sys; from pathlib import Path; from agents.policy.files import load_policy, save_policy\n"
-        "save_policy(load_policy(sys.argv[1]), Path(sys.argv[2]))"
+        "import sys; from pathlib import Path; from agents.policy.files import read_policy, save_policy\n"
+        "save_policy(read_policy(sys.argv[1]), Path(sys.argv[2]))"
     )
     again = folder.parent / "again"
     subprocess.run([sys.executable, "-c", program, str(folder), str(again)], cwd=ROOT, check=True)

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.policy.seeds import best_policy
 from agents.policy.shipped import SHIPPED
 from agents.reports.card import METRICS, TRAINING, compared, model_card
@@ -33,7 +33,7 @@ def test_the_hub_reads_what_was_measured_and_readers_where_it_is_worse(name):
     assert "| settled error, median, mm | 0.3 | 0.6 |" in card
     assert "is worse in: air, median." in card
     assert (
-        f"| uses the hand's force | {'yes' if load_policy(best_policy(name)).settings.force_sensor else 'no'} | yes |" in card
+        f"| uses the hand's force | {'yes' if read_policy(best_policy(name)).settings.force_sensor else 'no'} | yes |" in card
     )
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import pytest
 
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import policy_gradient, reached
 from agents.training.checkpoint import NAME
@@ -95,7 +95,7 @@ def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, 
     with pytest.raises(KeyboardInterrupt):
         train(TINY, RESIDUAL, tmp_path)
     assert "interrupted after 0 steps: policy and checkpoint are kept in " in capsys.readouterr().out
-    assert load_policy(tmp_path).settings == RESIDUAL
+    assert read_policy(tmp_path).settings == RESIDUAL
 
 
 CONFIGURATION = """[training]

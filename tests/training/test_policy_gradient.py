@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
@@ -34,6 +34,6 @@ def test_a_policy_from_scratch_learns_in_80_updates(settings, residual, most, tm
     # 1.3 to 4.6 mm, by the seed, where shut valves have 21.
     assert reached["policy"]["pooled_mm"] < most * reached["law"]["pooled_mm"]
     assert reached["policy"]["lost"] == 0
-    policy = load_policy(tmp_path)
+    policy = read_policy(tmp_path)
     assert policy.network.squashed
     assert policy.training["algorithm"] == "apg"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from agents.policy.files import FORMAT, WEIGHTS, load_policy, policy_content, save_policy
+from agents.policy.files import FORMAT, WEIGHTS, policy_content, read_policy, save_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_metrics
 from agents.reports import inspection
@@ -112,7 +112,7 @@ def test_a_damaged_learning_curve_is_named(tmp_path, text):
 
 def test_of_several_policies_that_do_not_say_what_they_reached_none_is_the_best(tmp_path):
     for k, reached in enumerate((3.0, None, 2.0)):
-        policy = load_policy(policy_folders("circle")[k])
+        policy = read_policy(policy_folders("circle")[k])
         save_policy(replace(policy, training={"reached": {"pooled_mm": reached}}), tmp_path / f"seed_{k}")
     (tmp_path / "seed_old").mkdir()
     save_policy(policy, tmp_path / "seed_old")
@@ -124,7 +124,7 @@ def test_of_several_policies_that_do_not_say_what_they_reached_none_is_the_best(
 
 @pytest.mark.parametrize("reached", ["abc", "nan", float("nan"), float("inf"), 10**400, -1.0, True, [1], None])
 def test_of_policies_that_reached_no_finite_error_none_is_the_best(tmp_path, reached):
-    policy = load_policy(policy_folders("circle")[0])
+    policy = read_policy(policy_folders("circle")[0])
     arrays, about = unsealed(policy_content(policy), FORMAT)
     for seed in ("seed_0", "seed_1"):
         (tmp_path / seed).mkdir()
@@ -141,12 +141,12 @@ def test_shipped_policies_load_fit_and_are_small(name):
     places = policy_folders(name)
     assert [place.name for place in places] == [f"seed_{k}" for k in range(len(places))]
     for place in places:
-        policy = load_policy(place)
+        policy = read_policy(place)
         assert policy.network.inputs == len(observation_names(policy.settings))
         assert sum(path.stat().st_size for path in place.iterdir()) < 60_000
         training = json.loads((place / "training.json").read_text(encoding="utf-8"))
         assert training["policy"]["pooled_mm"] == policy.training["reached"]["pooled_mm"]
-    reached = [load_policy(place).training["reached"]["pooled_mm"] for place in places]
+    reached = [read_policy(place).training["reached"]["pooled_mm"] for place in places]
     assert best_policy(name) == places[int(np.argmin(reached))]
 
 
@@ -177,7 +177,7 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkey
         "_follow",
         lambda policy, settings, lanes, time, *what: follow(policy, settings, lanes, min(time, 8.0), *what),
     )
-    policy = load_policy(best_policy("circle"))
+    policy = read_policy(best_policy("circle"))
     assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
     for unknown, half in zip(*friction_along_circle(policy), strict=True):
         # Newton for newton, and nothing where the law knows its friction.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.policy.seeds import best_policy, policy_folders
 from agents.reports.learning_curves import learning_curves
 from agents.residual.settings import ResidualSettings
@@ -90,7 +90,7 @@ def test_every_teacher_gets_a_student_that_is_a_policy(tmp_path, teachers, told)
     assert [folder.name for folder in folders] == ["seed_0", "seed_1"]
     assert best_policy(tmp_path / "both") in folders
     for seed, (folder, curve) in enumerate(zip(folders, learning_curves(folders), strict=True)):
-        policy = load_policy(folder)
+        policy = read_policy(folder)
         assert (policy.settings, policy.network.cells) == (ResidualSettings(force_sensor=False), 3)
         assert policy.training["seed"] == policy.training["teacher"]["seed"] == seed
         assert policy.training["sensors"] == "ideal"
@@ -115,7 +115,7 @@ def test_the_same_command_goes_on_with_the_seeds_that_are_not_done(tmp_path, tea
     command = ("--teacher", teachers, "--rounds", 1, "--hidden", 2, "--seeds", 2, "--out", tmp_path)
     with pytest.raises(SystemExit):
         told(*command)
-    load_policy(tmp_path / "seed_1")  # the best so far
+    read_policy(tmp_path / "seed_1")  # the best so far
     told(*command)
     assert taught == [0, 1, 1]
     told(*command)

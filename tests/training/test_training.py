@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from agents.policy.controller import ResidualController
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.residual.privileged import TRUE_PARAMETERS
 from agents.residual.settings import ResidualSettings
 from agents.training import reached as reached_module
@@ -85,7 +85,7 @@ def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tm
     reached = train(replace(BRIEF, validations=4), RESIDUAL, tmp_path)
     assert [point["max_mm"] for point in reached["curve"]] == [3.0, 9.0, 2.5, 4.0, 2.5]
     assert reached["policy"]["max_mm"] == 2.5
-    kept = load_policy(tmp_path)
+    kept = read_policy(tmp_path)
     assert kept.training["reached"]["pooled_mm"] == reached["curve"][2]["pooled_mm"]
     np.testing.assert_array_equal(kept.network.layers[-1][0], networks[2].layers[-1][0])
     assert len(networks) == 5
@@ -151,7 +151,7 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     assert [seed for seed in trains if seed is not None] == [[2_300_000 + lane for lane in range(4)]]
     assert len(checks) >= 3
     assert set(checks) == {VALIDATION_SEED}
-    assert load_policy(tmp_path).settings == residual
+    assert read_policy(tmp_path).settings == residual
 
 
 def test_a_training_that_could_not_tell_policies_apart_does_not_begin(tmp_path, monkeypatch, short_probe):
@@ -167,7 +167,7 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
     folder, _ = trained
     arguments = {"randomize": True, "duration": 4.5}
     inside = gymnasium.make_vec(PROBE, num_envs=5, **arguments)
-    score = validate(inside, load_policy(folder).network.acting(), 40)
+    score = validate(inside, read_policy(folder).network.acting(), 40)
     result = evaluate("BirthSIM/Probe-v2", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
     law = evaluate("BirthSIM/Probe-v2", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
@@ -227,7 +227,7 @@ def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
         "BirthSIM/ProbeResidual-v2", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
     )
     train(settings, ResidualSettings(), tmp_path)
-    policy = load_policy(tmp_path)
+    policy = read_policy(tmp_path)
     assert policy.training["privileged"] is True
     with pytest.raises(
         ValueError, match=rf"maps {policy.network.inputs} to 2 numbers; allowed: {policy.network.inputs - TRUE_PARAMETERS}"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.policy.seeds import policy_folders
 from baselines.bench.statistics import number
 from baselines.registry import resolved, uses_force
@@ -39,13 +39,13 @@ def is_shown(name: str, where: Conditions) -> bool:
 
 def trained_with(policy: str) -> str:
     """The sensor model with which a policy was trained; "" where it does not say."""
-    return str(load_policy(policy_folders(policy)[0]).training.get("sensors", ""))
+    return str(read_policy(policy_folders(policy)[0]).training.get("sensors", ""))
 
 
 def learns_mass(name: str) -> bool:
     """Whether a controller, as it runs, learns that the rig is lighter than believed; with sampled positions alone."""
     if name.startswith(LEARNED):
-        name = load_policy(policy_folders(name.removeprefix(LEARNED))[0]).settings.law
+        name = read_policy(policy_folders(name.removeprefix(LEARNED))[0]).settings.law
     plain, options = resolved(name.removeprefix(TOLD))
     return plain == "admittance" and options.get("learn", True) and options.get("force_sensor", True)
 

@@ -60,24 +60,24 @@ def _policies(name: str) -> Callable[[Path], bytes]:
     """A shipped policy's file."""
 
     def content(_: Path) -> bytes:
-        from agents.policy.files import WEIGHTS, load_policy
+        from agents.policy.files import WEIGHTS, read_policy
         from agents.policy.seeds import policy_folders
 
         folder = policy_folders(name)[0]
-        load_policy(folder)
+        read_policy(folder)
         return (folder / WEIGHTS).read_bytes()
 
     return content
 
 
 def _policy(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
-    from agents.policy.files import FORMAT, WEIGHTS, load_policy
+    from agents.policy.files import FORMAT, WEIGHTS, read_policy
 
     place = folder / "our_policy"
     place.mkdir()
     written(case, place / WEIGHTS, _sealed(rng, valid, FORMAT))
     case.names = ("our_policy",)
-    assert np.isfinite(load_policy(place).network.mean).all()
+    assert np.isfinite(read_policy(place).network.mean).all()
 
 
 def _checkpoints(folder: Path) -> tuple[Any, Any, bytes]:

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 
 from agents.policy.controller import ResidualController
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.policy.seeds import policy_folders
 from agents.residual.privileged import acting
 from agents.residual.settings import LAWS, is_one_of
@@ -50,7 +50,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
     rig = load_parameters(options.parameters or None).to_dict()
     where = {"sensors": options.sensors, "rig": rig, "seed": options.seed}
     folders = _seeds_of(options.policy)
-    own = load_policy(folders[0])
+    own = read_policy(folders[0])
     runs: list[Key] = []
     for name in (own.settings.law, options.policy, *options.beside):
         runs += [("errors", name, seed) for seed in ([""] if is_one_of(name, LAWS) else [one.name for one in _seeds_of(name)])]
@@ -69,19 +69,19 @@ def _tasks(options: Options) -> dict[Any, Task]:
 def _seeds_of(name: str) -> list[Path]:
     """Folders of the seeds of one training."""
     folders = policy_folders(name)
-    policies = [load_policy(folder) for folder in folders]
+    policies = [read_policy(folder) for folder in folders]
     if len({(policy.environment, policy.settings) for policy in policies}) > 1:
         raise ValueError(f"policy = {name!r} holds policies of several settings; allowed: seeds of one training")
     return folders
 
 
 def _privileged(folder: Path) -> bool:
-    return bool(load_policy(folder).training.get("privileged", False))
+    return bool(read_policy(folder).training.get("privileged", False))
 
 
 def errors(policy: str, law: str, network: str, sensors: str, rig: dict[str, Any], seed: int, episodes: int) -> Result:
     """Per world, what ``validate`` finds of a policy, or without it of the ``law`` in its environment."""
-    one = load_policy(Path(policy))
+    one = read_policy(Path(policy))
     settings = replace(one.settings, law=law) if law else one.settings
     env: Any = gymnasium.make_vec(
         one.environment,
@@ -127,7 +127,7 @@ def felt(policy: str, law: str, network: str, sensors: str, rig: dict[str, Any],
     A lane that is lost counts with ``LOST_ERROR`` mm, a just noticeable difference of infinity (null) and no bandwidth.
     """
     condition = Condition if law else _Learned
-    where = Parameters.from_dict(rig), sensors, seed, rigs, load_policy(Path(policy)).settings.force_sensor
+    where = Parameters.from_dict(rig), sensors, seed, rigs, read_policy(Path(policy)).settings.force_sensor
     found = rendering(condition(law or policy, *where), SETPOINT)
     kept, lost = np.array(found["peak"]) == PUSH, np.array(found["lost"])
     line = int(np.argmin(np.abs(np.array(found["frequency"]) - 1.0)))

@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.policy.pieces import evaluate_learned
 from agents.policy.seeds import policy_folders
 from agents.training.configuration import TARGETS
@@ -40,7 +40,7 @@ def own_motion(
     policy: str, who: str, network: str, hand: str, sensors: str, rig: dict[str, Any], seed: int, episodes: int
 ) -> Result:
     """Per world, the distance from the declared motion, mm, of a policy, of its controller or of one of ``BOUNDS``."""
-    one, believed = load_policy(Path(policy)), Parameters.from_dict(rig)
+    one, believed = read_policy(Path(policy)), Parameters.from_dict(rig)
     env: Any = gymnasium.make_vec(
         one.environment,
         num_envs=episodes,
@@ -64,7 +64,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
     rig, tasks = load_parameters(options.parameters or None), dict[Any, Task]()
     world = {"sensors": options.sensors, "randomize": True}
     folders = policy_folders(options.policy)
-    law = load_policy(folders[0]).settings.law
+    law = read_policy(folders[0]).settings.law
     bounds = BOUNDS if options.sensors == "honest" else ()
     for name, place in (*((name, folders[0]) for name in ("", *bounds)), *((one.name, one) for one in folders)):
         network = file_hash(str(place / WEIGHTS))
@@ -84,7 +84,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def _kept(options: Options, found: Found) -> Any:
-    law = load_policy(policy_folders(options.policy)[0]).settings.law
+    law = read_policy(policy_folders(options.policy)[0]).settings.law
     names = list(dict.fromkeys(name for hand, name, *_ in found if hand == HANDS[0]))
     bounds, seeds = [name for name in names if name in BOUNDS], [name for name in names if name not in ("", *BOUNDS)]
     groups = {law: [""], f"{options.policy}, {len(seeds)} seeds": seeds, **{name: [name] for name in bounds}}

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, read_policy
 from agents.policy.seeds import policy_folders
 from agents.policy.shipped import SHIPPED
 from baselines.bench.evaluation import evaluate
@@ -53,7 +53,7 @@ def _contestants(environment: str) -> Iterable[tuple[str, str]]:
         yield law, ""
     for name in names("policy"):
         if name.partition("_")[0] == _short(environment).lower():
-            for folder in (one for one in policy_folders(name) if load_policy(one).training["sensors"] in SENSORS):
+            for folder in (one for one in policy_folders(name) if read_policy(one).training["sensors"] in SENSORS):
                 yield f"{name} {folder.name}", f"{name}/{folder.name}"
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.policy.files import load_policy
+from agents.policy.files import read_policy
 from agents.policy.seeds import best_policy
 from baselines.registry import controlling_names, make_controller
 from birthsim_env import Parameters
@@ -53,7 +53,7 @@ def _here(array: Any) -> Any:
 def _run(scenario: str, sensors: str, who: str, device: str) -> Iterator[tuple[Any, ...]]:
     shared = {"num_envs": LANES, "sensors": sensors, "randomize": True, "device": device}
     if who == "residual":
-        policy = load_policy(best_policy(scenario))
+        policy = read_policy(best_policy(scenario))
         act = policy.network.acting()
         env: Any = gymnasium.make_vec(policy.environment, **shared, **policy.settings.to_dict())
     else:
