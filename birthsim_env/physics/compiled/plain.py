@@ -3,8 +3,8 @@
     BIRTHSIM_DEBUG=1 python -m pdb my_script.py
 
 Elements of NumPy's arrays are numbers of the same IEEE arithmetic as machine code's. Where Python differs it is made alike: no
-operation on numbers fails or warns, ``math`` gives kernels NumPy's numbers, of which a division by zero is infinite, and a power
-with a whole number is the product that Numba makes of it.
+operation on numbers fails or warns, ``math`` gives kernels NumPy's numbers, of which a division by zero is infinite, and a
+power with a whole number is the product that Numba makes of it.
 """
 
 import ast
@@ -68,7 +68,7 @@ def power(base: Any, exponent: int) -> Any:
 class _Powers(ast.NodeTransformer):
     """Writes ``power(base, 3)`` for ``base**3``."""
 
-    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:  # noqa: N802  its name in ``ast``
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
         whole = isinstance(node.right, ast.Constant) and isinstance(node.right.value, int)
         if not (whole and isinstance(node.op, ast.Pow)):
