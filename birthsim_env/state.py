@@ -163,7 +163,9 @@ class _Walk:
         pairs = sorted(content.items(), key=lambda pair: str(pair[0])) if isinstance(content, dict) else enumerate(content)
         for key, value in pairs:
             name = f"{place}.{key}" if place else str(key)
-            if name not in self.left_out:
+            # A number in a tuple cannot become another.
+            fixed = isinstance(content, tuple) and (_is_plain(value) or isinstance(value, np.generic))
+            if name not in self.left_out and not fixed:
                 self._visit(name, _Entry(content, key, owner, rules.get(str(key)) or kept), value)
 
     def _visit(self, name: str, entry: _Entry, value: Any) -> None:
