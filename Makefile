@@ -111,6 +111,7 @@ test: $(READY)
 test-slow: $(READY)
 	$(BIN)/python -m tests.warming
 	$(PYTEST) -m slow
+	HYPOTHESIS_PROFILE=slow $(PYTEST) -m "not slow" tests/fuzz
 
 # Between two edits: what changed, the order of the packages, and the stored trajectories.
 quick: $(READY)

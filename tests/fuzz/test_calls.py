@@ -13,12 +13,10 @@ from hypothesis import strategies as st
 from agents.residual.env import ResidualEnv
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings
-from baselines.registry import controller_names, known_options, make_controller
+from baselines.registry import known_options, make_controller
 from birthsim_env import Parameters, Plant, StiffnessSchedule, Trajectory, UserForce
 from birthsim_env.env import BirthSIMEnv
-from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.hands.user_forces import CompiledForce
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.registry import names
 from birthsim_env.vector_env import BirthSIMVectorEnv
 from tests.fuzz.rigs import run_a_little
 from tests.fuzz.strategies import near, strange
@@ -30,10 +28,10 @@ CIRCLE, RIG = "BirthSIM/Circle-v1", Parameters()
 GOOD = {
     "action_mode": ("valve", "flow"),
     "valves": ("two_valves", "one_valve"),
-    "sensors": tuple(SENSORS),
+    "sensors": tuple(names("sensors")),
     "randomize": (False, True, "plant", "scenario", "sensors", {"mechanics.mass": (2, 5)}),
     "reference": (None,),
-    "user_force": (None, "steps", *HANDS),
+    "user_force": (None, *names("hand")),
     "stiffness": (None,),
     "parameters": (None,),
     "policy_period": (0.01, 0.002, 0.1),
@@ -63,8 +61,8 @@ def arguments(draw, table):
 def compiled():
     """Loops of other options are compiled before time and memory count."""
     modes = (("valve", "two_valves"), ("flow", "one_valve"), ("flow", "two_valves"), ("valve", "one_valve"))
-    for k, sensors in enumerate(SENSORS):
-        for (mode, valves), hand in zip(modes, ("steps", *HANDS), strict=False):
+    for k, sensors in enumerate(names("sensors")):
+        for (mode, valves), hand in zip(modes, names("hand"), strict=False):
             env = BirthSIMVectorEnv("circle", num_envs=2, action_mode=mode, valves=valves, sensors=sensors, user_force=hand)
             env.reset(seed=k, options={"staggered": True})
             env.step(np.zeros(env.action_space.shape))
@@ -129,11 +127,12 @@ def options_of(make):
 
 
 def parts(role):
-    """The classes of a role that a user makes, whatever file they stand in."""
+    """The classes of a role that a user makes with options, whatever file they stand in."""
     for kind in role.__subclasses__():
         yield from parts(kind)
-    lacks = [name for name, default in options_of(role).items() if default is inspect.Parameter.empty and name not in REQUIRED]
-    if not lacks and not role.__name__.startswith("_") and role not in (Trajectory, UserForce, CompiledForce):
+    options = options_of(role)
+    lacks = [name for name, default in options.items() if default is inspect.Parameter.empty and name not in REQUIRED]
+    if options and not lacks and not role.__name__.startswith("_"):
         yield role
 
 
@@ -196,8 +195,10 @@ def test_a_part_or_settings(name, data):
 
 
 SLOW = {"nonlinear-mpc"}
+POLICY = "residual"
+"""It is nothing without a policy's file, which is fuzzed by itself."""
 CONTROLLERS = [
-    pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in controller_names() if name != "residual"
+    pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in names("controller") if name != POLICY
 ]
 
 

@@ -13,12 +13,11 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.commands import command as running
-from baselines.commands.command import program
-from baselines.commands.start import load, perform
-from birthsim.door import COMMANDS
-from birthsim.export import FORMS
+from birthsim.command_line.command import perform_with, program
+from birthsim.command_line.start import perform
+from birthsim.main import COMMANDS, load
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.registry import entry, names
 from birthsim_live.rig.folder import packed_page
 from lab.studies.shelf import declared
 from tests.fuzz.rigs import odd_rig
@@ -31,7 +30,7 @@ ODD = (
     *("bandwidth=60", "--", "-x"),
 )
 WORDS = st.sampled_from(ODD) | st.text(st.characters(exclude_characters="\x00"), max_size=10)
-BEFORE = {"wasm": [], "onnx": [], "parquet": ["none.rec"], "mcap": ["none.rec"]}
+BEFORE = {form: ["none.rec"] for form in ("parquet", "mcap")}
 """Words of an export without which it says no more than that they are missing."""
 
 
@@ -46,19 +45,18 @@ def begin(*_):
 @cache
 def settings_of(name):
     """The settings of a command, and its options."""
-    if name == "sweep":
-        settings = declared("sweep").settings("")
-    elif (form := name.removeprefix("export ")) != name:
-        settings = load(name, FORMS[form][0], f"commands.{FORMS[form][1]}").Settings
+    command, _, form = name.partition(" ")
+    if form:
+        settings = entry("export", form).made.settings
     else:
-        settings = load(name, COMMANDS[name].package, COMMANDS[name].module).Settings
+        settings = declared("sweep").settings("") if command == "sweep" else load(command).Settings
     options = program("x", settings).assemble_argument_collection()
     return settings, [option for one in options for option in one.names if option.startswith("--")]
 
 
 OF_ITS_OWN = {"study", "export"}
 """Commands that have others below them."""
-LINES = [name for name in COMMANDS if name not in OF_ITS_OWN] + [f"export {form}" for form in FORMS] + ["sweep"]
+LINES = [*(name for name in COMMANDS if name not in OF_ITS_OWN), *(f"export {form}" for form in names("export")), "sweep"]
 
 
 @pytest.mark.parametrize("name", LINES)
@@ -66,7 +64,8 @@ LINES = [name for name in COMMANDS if name not in OF_ITS_OWN] + [f"export {form}
 @given(data=st.data())
 def test_a_command_line(name, data):
     settings, options = settings_of(name)
-    line = [*(["--to", name.removeprefix("export ")] if name.startswith("export") else []), *BEFORE.get(name, [])]
+    form = name.partition(" ")[2]
+    line = [*(["--to", form] if form else []), *BEFORE.get(form, [])]
     chosen = data.draw(st.lists(st.sampled_from(options or ["--x"]), unique=True, max_size=4))
     for option in chosen:
         line += [option, data.draw(WORDS)]
@@ -76,7 +75,7 @@ def test_a_command_line(name, data):
     with watched(runs_code=True), contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
         try:
             with patch.object(sys, "argv", [name, *line]):
-                running.perform_with(name, settings, begin, "")
+                perform_with(name, settings, begin, "")
         except BeganError:
             pass
         except SystemExit as end:
@@ -103,7 +102,7 @@ def attempt(command, path, out):
                 return ""
             words = [*RUNS[command], "--parameters", str(path), "--out", str(out)]
             with patch.object(sys, "argv", [f"birthsim {command}", *words]):
-                perform(f"birthsim {command}", COMMANDS[command].package, COMMANDS[command].module)
+                perform(f"birthsim {command}", load(command))
         return ""
     except SystemExit as end:
         lines = [text for text in re.split(r"[\r\n]+", complained.getvalue()) if "error:" in text or "Error" in text]

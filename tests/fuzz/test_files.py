@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.training.configuration import FOLDER, load_configuration
-from baselines.commands.tune import start_of
 from baselines.work.tasks import Task, run_tasks
+from birthsim.commands.tune import start_of
 from birthsim_env import Parameters
 from birthsim_live.logs.recording import load_recording
 from tests.fuzz.rigs import odd_rig, run_a_little

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from baselines.identification.estimate import Problem, search
 from baselines.identification.experiment import propose
+from baselines.identification.free_parameters import FREE_PARAMETERS
 from baselines.identification.laboratory import run_plan
 from baselines.identification.noise import guessed_noise
-from baselines.identification.quantities import QUANTITIES
 from baselines.identification.rows import checked_trial
 from baselines.identification.trial import Trial
 from baselines.identification.windows import cut
@@ -37,7 +37,7 @@ def log():
 
 
 def fit(trial):
-    some = tuple(one for one in QUANTITIES if one.name in ("mechanics.mass", "valves.sonic_conductance"))
+    some = tuple(one for one in FREE_PARAMETERS if one.name in ("mechanics.mass", "valves.sonic_conductance"))
     windows = cut(trial, RIG, 0.05)
     chosen = np.unique(np.linspace(0, len(windows.starts) - 1, 3).astype(np.intp))
     problem = Problem(windows.some(chosen), guessed_noise(trial), RIG, some, lambda: None)
