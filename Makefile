@@ -1,10 +1,9 @@
 # make quick  lints, and runs the contracts and the stored trajectories: half a minute, between two edits
 # make run    installs, reproduces Fig. 4, trains a residual policy and, by gradients, a controller from scratch, and evaluates them
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
-# make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
-# make fuzz tries odd input on everything that is read or called; make soak runs 10^8 policy steps (an hour or more)
+# make fuzz tries odd input on everything that is read or called, and make kills disturbs every command at random moments (hours)
+# make mutation changes the physics to see whether a test fails (an hour or so); make soak runs 10^8 policy steps (half an hour)
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
-# make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds, of built code too
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make results runs every study whose result is stale, and writes the tables and pictures that show them
@@ -24,6 +23,7 @@ READY := $(VENV)/.ready
 OUT := out
 TOOLS := $(OUT)/tools
 NPM := $(OUT)/npm
+MUTMUT := $(OUT)/mutmut
 OLDEST := numba==0.65.0 llvmlite==0.47.0
 PYTEST := $(BIN)/python -m pytest -n 2 --durations 20 --durations-min 1
 # --no-input: a failing index must fail, not wait for somebody to type.
@@ -53,7 +53,7 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links devcontainer golden clean
+.PHONY: run figure test test-slow quick test-weekly portable oldest fuzz mutation soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links devcontainer golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml packaging/requirements/base.txt
@@ -108,6 +108,7 @@ test: $(READY)
 test-slow: $(READY)
 	$(BIN)/python -m tests.warming
 	$(PYTEST) -m slow
+	HYPOTHESIS_PROFILE=slow $(PYTEST) -m "not slow" tests/fuzz
 
 # Between two edits: what changed, the order of the packages, and the stored trajectories.
 quick: $(READY)
@@ -128,21 +129,9 @@ oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
 	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m lab.studies.processors here
 
-verify: $(READY)
-	$(BIN)/birthsim study accuracy
-	$(BIN)/birthsim study verification balances
-	$(BIN)/birthsim study verification report
-
-# Survivors are judged by hand, in lab/studies/verification/survivors.toml; a test names those that are not.
-verify-slow: $(READY)
-	mkdir -p $(OUT)/verify
-	$(BIN)/birthsim study mutation --limit 3 --budget 4 --every 3 --out $(OUT)/verify/mutation.json
-	$(BIN)/birthsim study verification mutation $(OUT)/verify/mutation.json
-	$(BIN)/birthsim study verification coverage
-	$(MAKE) verify
-
+# A full disk needs root.
 kills: $(READY)
-	nice $(BIN)/python -m lab.studies.kills --out docs/kills.json --page
+	KILLS=$${KILLS:-12} nice $(PYTEST) tests/kills
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live lab tests .ci
@@ -245,9 +234,19 @@ targets: $(READY)
 page: $(READY)
 	$(BIN)/python -m birthsim_live.rig.build
 
+# Odd input ends a process that goes on from it: without workers, the last test named is the one.
 fuzz: $(READY)
-	mkdir -p $(OUT)
-	$(BIN)/birthsim study fuzz --cases 5000 --out $(OUT)/fuzz.json
+	HYPOTHESIS_PROFILE=deep nice $(BIN)/python -m pytest -v --hypothesis-seed=$${SEED:-0} tests/fuzz
+
+# mutmut leaves functions with decorators alone: in the copy kernels have none, and are plain Python. Tests that take long are skipped.
+mutation: $(READY)
+	test -x $(MUTMUT)/bin/mutmut || { python3 -m venv $(MUTMUT) && echo "$(CURDIR)/$(VENV)/lib/$$(ls $(VENV)/lib)/site-packages" > \
+	  $(MUTMUT)/lib/$$(ls $(MUTMUT)/lib)/site-packages/project.pth && $(MUTMUT)/bin/pip install --quiet mutmut==3.8.1; }
+	rm -rf $(OUT)/mutation && mkdir -p $(OUT)/mutation
+	git ls-files -z | xargs -0 cp --parents --target-directory $(OUT)/mutation
+	find $(OUT)/mutation -name '*.py' -exec sed -i -E '/^@(kernel|helper)$$/d' {} +
+	cd $(OUT)/mutation && NUMBA_DISABLE_JIT=1 HYPOTHESIS_PROFILE=brief nice $(CURDIR)/$(MUTMUT)/bin/mutmut run --max-children 2 $(MUTANTS)
+	cd $(OUT)/mutation && $(CURDIR)/$(MUTMUT)/bin/mutmut results
 
 # A warning fails it: a page that no list names, a link or an anchor that leads nowhere, a cell that fails.
 docs: $(READY) $(NPM)/.ready

@@ -1,6 +1,8 @@
 """What several tests share: property tests that repeat themselves and may take their time, a short training, a last word."""
 
+import inspect
 import os
+import pkgutil
 import signal
 from collections import Counter
 from importlib import import_module
@@ -14,15 +16,20 @@ import gymnasium
 import pytest
 from hypothesis import settings
 
+from birthsim_env import physics
 from tests.console import ROOT, run
 from tests.live import browser
 
 # A process that a script starts in the background ignores Ctrl-C; tests that raise it need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# The same examples every time, and as long as a busy machine needs.
-settings.register_profile("birthsim", deadline=None, derandomize=True, database=None)
-settings.load_profile("birthsim")
+# The same examples every time, and as long as a busy machine needs; make test-slow tries more, make fuzz others, mutants few.
+settings.register_profile("quick", deadline=None, derandomize=True, database=None)
+settings.register_profile("deep", settings.get_profile("quick"), derandomize=False, max_examples=50_000)
+settings.register_profile("slow", settings.get_profile("quick"), max_examples=4000)
+settings.register_profile("brief", settings.get_profile("quick"), max_examples=5)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+MUTANTS = os.environ.get("HYPOTHESIS_PROFILE") == "brief"
 
 SMALL = """[training]
 environment = "BirthSIM/ProbeResidual-v2"
@@ -82,6 +89,28 @@ def brief(monkeypatch):
     """Evaluated episodes of 7 s, which have their first push."""
     make_vec = gymnasium.make_vec
     monkeypatch.setattr(gymnasium, "make_vec", lambda *args, **options: make_vec(*args, duration=7.0, **options))
+
+
+def pytest_sessionstart():
+    """Mutants are plain functions, of which tests ask what they ask of kernels."""
+    if MUTANTS:
+        for module in pkgutil.walk_packages(physics.__path__, f"{physics.__name__}."):
+            for function in filter(inspect.isfunction, vars(import_module(module.name)).values()):
+                function.py_func = function
+
+
+@pytest.fixture(autouse=MUTANTS)
+def quick_enough_for_mutants():
+    """Uncompiled some tests take minutes: mutmut goes on without those that take 3 s."""
+
+    def skip(*_):
+        pytest.skip("takes long uncompiled")
+
+    before = signal.signal(signal.SIGPROF, skip)
+    signal.setitimer(signal.ITIMER_PROF, 3.0)
+    yield
+    signal.setitimer(signal.ITIMER_PROF, 0)
+    signal.signal(signal.SIGPROF, before)
 
 
 def pytest_terminal_summary(terminalreporter):

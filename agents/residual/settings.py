@@ -31,7 +31,10 @@ def needs_force(law: str) -> bool:
 
 def is_one_of(name: str, allowed: tuple[str, ...]) -> bool:
     """Whether a law, or what else has a name, is among those allowed, whichever of its names is given."""
-    return name in allowed or resolved(name) in [resolved(one) for one in allowed]
+    try:
+        return name in allowed or resolved(name) in [resolved(one) for one in allowed]
+    except ValueError:  # options that are none
+        return False
 
 
 @dataclass(frozen=True)

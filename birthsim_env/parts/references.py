@@ -314,4 +314,6 @@ class FixedTarget(Path):
     def __init__(self, position: tuple[Range, Range] = (0.5, 0.0)) -> None:
         if not (isinstance(position, tuple) and len(position) == 2):
             raise ValueError(f"position = {shown(position)}; allowed: (x, y), numbers or ranges (low, high) (m)")
+        for axis, coordinate in zip("xy", position, strict=True):
+            checked_range(f"position {axis}", coordinate, "m", least=-FARTHEST, most=FARTHEST)
         super().__init__(start=position)

@@ -12,10 +12,10 @@ from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
-from lab.studies.verification.strict_feedback import strict_feedback_rates
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles.strict_feedback import strict_feedback_rates
 
 LANES, STEP = 4, 2e-4
 UNITS = ((1.0, 0.0, 1.0, 0.0), (0.0, 1.0, 0.0, 1.0))

@@ -5,8 +5,8 @@ import pytest
 import sympy as sp
 
 from birthsim_env import Parameters
-from lab.studies.verification.strict_feedback import neglected_acceleration, strict_feedback_rates
 from tests.oracles import derived_law as derived
+from tests.oracles.strict_feedback import neglected_acceleration, strict_feedback_rates
 from tests.physics.rigs import TILTED
 
 LANES = 40

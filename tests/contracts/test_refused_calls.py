@@ -23,7 +23,7 @@ from birthsim_env.parts.drawn.seeding import draw
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from lab.studies.lyapunov import LyapunovFunction
-from lab.studies.verification.strict_feedback import strict_feedback_rates
+from tests.oracles.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = float("nan"), float("inf")

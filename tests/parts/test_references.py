@@ -14,7 +14,7 @@ from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.geometry import end_effector
 from birthsim_env.registry import names
-from lab.studies.fuzz.odd_rigs import odd_rig
+from tests.fuzz.rigs import odd_rig
 
 RIG = Parameters()
 RADIUS = {"least": 0.3, "most": 0.7}

@@ -8,7 +8,7 @@ from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.verification.bookkeeper import WALL, Bookkeeper, P, T, Volumes, mass_and_energy
+from tests.oracles.bookkeeper import WALL, Bookkeeper, P, T, Volumes, mass_and_energy
 
 FIXED = {"valves.leakage_ratio": 0.0, "mechanics.mass": 1e18, "mechanics.gravity": 0.0}
 """Pistons that do not move: their mass is out of reach of the pressures."""

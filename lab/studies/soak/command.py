@@ -5,7 +5,6 @@ reward or state was not finite or outside its space, or where memory grew.
 """
 
 import json
-import platform
 import sys
 from collections import defaultdict
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from baselines.work.asked import registered
 from baselines.work.side_by_side import ONE_THREAD
 from baselines.work.tasks import code_stamp
 from birthsim.command_line.settings import Configured, Seed, whole
-from birthsim_env.files import make_folder, write_json, write_text
+from birthsim_env.files import make_folder, write_text
 from birthsim_env.physics.rig.json_reading import parse_json
 from birthsim_env.registry import register
 from lab.engine.alone import only_under
@@ -67,36 +66,6 @@ def table(laps: Laps) -> str:
     return "\n".join(lines)
 
 
-def report(laps: Laps, setting: dict[str, Any]) -> str:
-    """What a soak has found, Markdown."""
-    steps, seconds = sum(lap["steps"] for lap in laps), sum(lap["seconds"] for lap in laps)
-    memory = [lap["rss"] for lap in laps]
-    tenths = ", ".join(f"{np.median(part):.0f}" for part in np.array_split(memory, min(10, len(memory))))
-    return "\n".join(
-        [
-            "# Soak",
-            "",
-            f"`make soak` ran {steps:,} policy steps in {len(laps)} laps of {LANES} lanes (rigs side by side). It took "
-            f"{seconds / 3600:.1f} h on one thread ({steps / seconds:,.0f} steps/s, {platform.machine()}).",
-            "",
-            "Each lap has other conditions. The rigs are at a corner of the ranges of domain randomisation, or drawn from "
-            "them. Friction law, sensors and hand differ. The action is random openings or flows, a residual with random "
-            "actions on some law, or a rival.",
-            "",
-            "Every step was checked. Observations are finite and inside their space, rewards are finite and from 0 to 1, and "
-            "states and `info` are finite.",
-            "",
-            table(laps),
-            "",
-            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Median memory in each tenth of the run, MB: {tenths}. It grew "
-            f"by {growth(laps):.1f} MB from the sixth tenth to the last.",
-            "",
-            f"Seed {setting['seed']}, BirthSIM {setting['code']['version']}, sources {setting['code']['sources'][:12]}.",
-            "",
-        ]
-    )
-
-
 @dataclass(kw_only=True)
 class Settings(Configured):
     """Run policy steps over all that there is; interrupted, the same command carries on."""
@@ -105,7 +74,7 @@ class Settings(Configured):
     """Policy steps."""
     seed: Seed = 0
     out: Path = Path("out/soak")
-    """Folder for laps.jsonl, soak.md and soak.json."""
+    """Folder for laps.jsonl, which the same command goes on from."""
 
 
 @register(study="soak", about="10^8 policy steps over all that there is")
@@ -133,11 +102,7 @@ def main(settings: Settings) -> None:
                     bar.write(f"lap {number}, {lap['scenario']}, {lap['control']}: {fault}", file=sys.stderr)
     except KeyboardInterrupt:
         print(f"interrupted: {len(laps)} of {wanted} laps are kept; the same command carries on", file=sys.stderr)
-    if not laps:
-        return
-    text = report(laps, setting)
-    write_text(settings.out / "soak.md", text)
-    write_json(settings.out / "soak.json", {**setting, "laps": laps})
-    print(text)
+    print(table(laps))
+    print(f"memory grew by {growth(laps):.1f} MB from the sixth tenth of the laps to the last")
     if growth(laps) > GROWTH or any(lap["faults"] for lap in laps):
         raise SystemExit(1)

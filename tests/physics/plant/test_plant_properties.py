@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.verification.bookkeeper import mass_and_energy, sources
+from tests.oracles.bookkeeper import mass_and_energy, sources
 from tests.physics.rigs import LAWS
 from tests.physics.test_dynamics import anywhere
 

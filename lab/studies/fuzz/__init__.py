@@ -1,1 +1,0 @@
-"""Fuzzing of everything that reads what a user wrote: files, arguments of constructors, command lines."""

@@ -1,1 +1,0 @@
-"""How many small changes of the numerical modules their tests notice."""

@@ -1,1 +1,0 @@
-"""The verification report: what is measured, what keeps each promise, and the page that is generated from both."""

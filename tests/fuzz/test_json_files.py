@@ -1,0 +1,90 @@
+"""JSON that commands and studies read: of trainings, evaluations, entries of the leaderboard and results of studies."""
+
+import json
+import math
+from functools import cache
+from io import BytesIO
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lab.studies.results import changed, read_result
+
+from agents.policy.seeds import policy_folders
+from agents.reports.card import settings_of
+from agents.reports.learning_curves import FIGURES, learning_curves
+from baselines.logs.writing import WRITERS
+from birthsim_env import Parameters
+from birthsim_live.logs.reading import read_log
+from lab.studies import leaderboard
+from tests.console import ROOT
+from tests.fuzz.strategies import json_texts
+from tests.fuzz.watched import cases, watched
+
+
+def training(path, case):
+    (curve,) = learning_curves([path.parent])
+    case.names = ()
+    for point in (curve["law"], *curve["curve"]):
+        assert all(point[name] is None or math.isfinite(point[name]) for name, _ in FIGURES)
+    Parameters.from_dict(settings_of(path.parent)["rig"])
+
+
+def evaluation(path, case):
+    log = read_log(path)
+    for writer in WRITERS.values():
+        writer(log, BytesIO())
+
+
+def entry(path, case):
+    said = leaderboard.entry(path)
+    case.names = ()
+    if problem := leaderboard.against_rules(said, path.parent):
+        raise ValueError(problem)
+    leaderboard.row(said, "entry")
+
+
+def result(path, case):
+    changed(read_result(path.stem, path.parent), ())
+
+
+def evaluated():
+    """An evaluation of a few episodes, which are faster to change."""
+    content = json.loads((ROOT / "lab" / "leaderboard" / "pid.json").read_text(encoding="utf-8"))
+    for one in content["results"]:
+        for name in ("seeds", "lost", "success", "required_strength_ratio"):
+            one[name] = one[name][:2]
+        for name in ("episodes", "returns"):
+            one[name] = {key: values[:2] for key, values in one[name].items()}
+    return content
+
+
+READERS = {
+    "training.json": (training, lambda: json.loads((policy_folders("probe")[0] / "training.json").read_text(encoding="utf-8"))),
+    "evaluation.json": (evaluation, evaluated),
+    "entry.json": (entry, evaluated),
+    "stiffest.json": (result, lambda: read_result("stiffest")),
+}
+
+
+@cache
+def valid(name):
+    """What is altered; as it is, it is read."""
+    read, content = READERS[name][0], READERS[name][1]()
+    with watched(name, memory=2**30) as case:
+        path = case.folder / name
+        path.write_text(json.dumps(content), encoding="utf-8")
+        read(path, case)
+    assert case.refused == ""
+    return content
+
+
+@pytest.mark.parametrize("name", READERS)
+@cases
+@given(data=st.data())
+def test_json(name, data):
+    content = data.draw(json_texts(valid(name)))
+    with watched(name) as case:
+        path = case.folder / name
+        path.write_bytes(content)
+        READERS[name][0](path, case)
