@@ -20,6 +20,9 @@ from birthsim_env import physics
 from tests.console import ROOT, run
 from tests.live import browser
 
+# Files that are copied into a tree of their own.
+collect_ignore = ["project/recipes"]
+
 # A process that a script starts in the background ignores Ctrl-C; tests that raise it need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from baselines.registry import make_controller
+from baselines.registry import compiled_names, make_controller
 from birthsim_build.building import build_c
 from birthsim_build.bundle import Bundle, identifier
 from birthsim_build.code.targets import HOST
@@ -76,6 +76,20 @@ def test_a_law_alone(rows_of, sensors):
     seen, openings = law_openings(LAW, sensors)
     rows = rows_of(f"law_{identifier(LAW)}_{KINDS[sensors]}", "controller", LAW, sensors, inputs=as_inputs(seen))
     assert_same_bits(rows[:, OPENINGS], openings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", KINDS)
+def test_every_controller_alone_in_c(tmp_path, sensors):
+    need_linker()
+    if HOST is None:
+        pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")
+    names = compiled_names(listed=True)
+    build(HOST, tmp_path, "--controller", *names, "--sensors", sensors)
+    for name in names:
+        seen, openings = law_openings(name, sensors)
+        rows = library_rows(tmp_path, f"law_{identifier(name)}_{KINDS[sensors]}", PERIODS, as_inputs(seen))
+        assert_same_bits(rows[:, OPENINGS], openings)
 
 
 @pytest.mark.parametrize("sensors", KINDS)
