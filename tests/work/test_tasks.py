@@ -52,7 +52,7 @@ def test_results_are_written_piece_by_piece_and_come_back_as_written(log, tmp_pa
     task = made(log)[3]
     content = json.loads((tmp_path / "out" / task.file()).read_text())
     assert content["result"] == {"square": 9, "nothing": None}
-    assert content["code"] == code_stamp(task.work)
+    assert content["code"] == code_stamp(task.work, content["used"])
     assert content["settings"] == task.settings
 
 
