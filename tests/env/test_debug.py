@@ -67,7 +67,8 @@ def line_of(text):
 
 
 def test_nothing_is_built_for_other_targets():
-    done = run("-c", "from birthsim_env.loop.stage import compiled; from birthsim_env.loop.world import _plant; compiled(_plant)")
+    program = "from birthsim_env.loop import stage, world; stage.compiled(world._plant)"
+    done = run("-c", program)
     assert done.returncode != 0
     assert "BIRTHSIM_DEBUG = 1" in done.stderr.splitlines()[-1]
     assert "allowed: " in done.stderr.splitlines()[-1]
