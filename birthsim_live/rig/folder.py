@@ -42,11 +42,17 @@ def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[s
     known = {one["name"] for one in content["hello"]["choices"]["controller"]}
     others = [name for name in dict.fromkeys([*asked, *(f"{RESIDUAL}:{one}" for one in policies)]) if name not in known]
     others = [name for name in others if ".py:" not in name]  # Python runs these
-    if rig == Parameters() and not others:
+    if rig == Parameters() and not others and _lists_all(content):
         return built
     from birthsim_live.rig.pack import pack  # which takes a second to load
 
     return pack(rig, loadable_names(), content["functions"], others)
+
+
+def _lists_all(content: dict[str, Any]) -> bool:
+    """Whether every scenario and sensor model that is registered now was so when the page's rig was built."""
+    listed = {kind: {one["name"] for one in content["hello"]["choices"][kind]} for kind in ("scenario", "sensors")}
+    return all(set(names(kind)) <= known for kind, known in listed.items())
 
 
 def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -> None:
