@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from birthsim_build.code import threads
+from birthsim_env.physics.compiled.lanes import MASS
 from tests.console import call
 
 LACKS = [
@@ -63,6 +64,6 @@ def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
     assert words[0] == threads.MAGIC
     about = json.loads((tmp_path / "out" / "circle_ideal_pid.json").read_text())
     assert about["words_of_data"] == words[threads.ROWS]
-    assert about["rows"]["rig_mass"] == 8
+    assert about["rows"]["rig_mass"] == MASS
     assert {"y1", "measured_x", "reward", "terminated", "tracking_error1"} <= about["rows"].keys()
     assert max(about["rows"].values()) < words[threads.ROWS]
