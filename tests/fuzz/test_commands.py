@@ -12,7 +12,6 @@ import pytest
 import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
-from lab.studies.shelf import declared
 
 from birthsim.command_line.command import perform_with, program
 from birthsim.command_line.start import perform
@@ -20,6 +19,7 @@ from birthsim.main import COMMANDS, load
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import entry, names
 from birthsim_live.rig.folder import packed_page
+from lab.engine.shelf import declared
 from tests.fuzz.rigs import odd_rig
 from tests.fuzz.watched import cases, watched
 

@@ -8,14 +8,14 @@ from io import BytesIO
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lab.studies.results import changed, read_result
 
 from agents.policy.seeds import policy_folders
 from agents.reports.card import settings_of
-from agents.reports.learning_curves import FIGURES, learning_curves
+from agents.reports.learning_curves import METRICS, learning_curves
 from baselines.logs.writing import WRITERS
 from birthsim_env import Parameters
 from birthsim_live.logs.reading import read_log
+from lab.engine.results import changed, read_result
 from lab.studies import leaderboard
 from tests.console import ROOT
 from tests.fuzz.strategies import json_texts
@@ -26,7 +26,7 @@ def training(path, case):
     (curve,) = learning_curves([path.parent])
     case.names = ()
     for point in (curve["law"], *curve["curve"]):
-        assert all(point[name] is None or math.isfinite(point[name]) for name, _ in FIGURES)
+        assert all(point[name] is None or math.isfinite(point[name]) for name, _ in METRICS)
     Parameters.from_dict(settings_of(path.parent)["rig"])
 
 

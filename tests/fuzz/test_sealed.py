@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.policy.files import FORMAT, WEIGHTS, load_policy
+from agents.policy.files import FORMAT, WEIGHTS, read_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.policy.seeds import policy_folders
 from agents.training import checkpoint
@@ -47,7 +47,7 @@ def odd_seals(draw, content, form):
 def policy(name):
     """A shipped policy's file; as it is, it is read."""
     (folder, *_) = policy_folders(name)
-    load_policy(folder)
+    read_policy(folder)
     return (folder / WEIGHTS).read_bytes()
 
 
@@ -60,7 +60,7 @@ def test_a_policy_without_and_with_a_memory(name, data):
         place = case.folder / "our_policy"
         place.mkdir()
         (place / WEIGHTS).write_bytes(content)
-        assert np.isfinite(load_policy(place).network.mean).all()
+        assert np.isfinite(read_policy(place).network.mean).all()
 
 
 @pytest.fixture(scope="module")
