@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.consistency import least_dead_volume
 from birthsim_env.physics.rig.declaration import Prior
-from birthsim_env.physics.rig.parameters import DECLARED, Parameters, least_dead_volume, value_of
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 
 
 class FreeParameter(NamedTuple):

@@ -11,7 +11,8 @@ from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
-from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, least_dead_volume, parameter_of
+from birthsim_env.physics.rig.consistency import least_dead_volume
+from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, parameter_of
 from birthsim_env.physics.rig.values import is_finite, shown
 from birthsim_env.registry import entries
 

@@ -1,0 +1,89 @@
+"""What the sections of a rig must fulfil together, and what of them follows where another one changes."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from birthsim_env.physics.rig.parameters import Parameters
+
+STOP_DEPTH = 0.01
+"""m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
+
+FASTEST_RATE = 7000.0
+"""1/s. Runge-Kutta steps of 0.25 ms are stable up to 11000; the spring of the bristles takes its share."""
+
+
+def check_together(rig: "Parameters") -> None:
+    """Raise ``ValueError`` for values that are possible one by one but not together: field, value, what is allowed."""
+    _check_linkage(rig)
+    _check_dead_volume(rig)
+    _check_stability(rig)
+
+
+def _check_linkage(rig: "Parameters") -> None:
+    g = rig.geometry
+    for name, offset, cylinder in (("k1", g.k1, rig.cylinder1), ("k2", g.k2, rig.cylinder2)):
+        if offset <= 0.55 * cylinder.stroke:
+            raise ValueError(
+                f"Geometry.{name} = {offset!r} is impossible; allowed: more than {0.55 * cylinder.stroke:g} m, "
+                f"0.55 strokes, so that the cylinder's length stays positive"
+            )
+    shortest, longest = abs(g.d3 - g.d6), g.d3 + g.d6
+    least, most = g.k1 - rig.cylinder1.stroke / 2, g.k1 + rig.cylinder1.stroke / 2
+    if not shortest * 1.05 < least < most < longest * 0.98:
+        raise ValueError(
+            f"Geometry.k1 = {g.k1!r} with stroke {rig.cylinder1.stroke!r} is impossible; allowed: cylinder 1's "
+            f"length {least:g} to {most:g} m must lie in {shortest * 1.05:g} to {longest * 0.98:g} m"
+        )
+
+
+def _check_dead_volume(rig: "Parameters") -> None:
+    # A hard collision pushes a piston millimetres into its end stop; the chamber there must not lose all its volume.
+    least = least_dead_volume(rig)
+    if rig.chambers.dead_volume < least:
+        raise ValueError(
+            f"Chambers.dead_volume = {rig.chambers.dead_volume!r} is impossible; allowed: at least {least:.3g} m3, "
+            f"{1e3 * STOP_DEPTH:g} mm of the largest piston"
+        )
+
+
+def _check_stability(rig: "Parameters") -> None:
+    f, viscous = rig.friction, max(rig.cylinder1.viscous_friction, rig.cylinder2.viscous_friction)
+    coulomb = max(rig.cylinder1.coulomb_friction, rig.cylinder2.coulomb_friction)
+    damping = viscous + (coulomb / f.sign_speed if f.law == "coulomb" else f.bristle_damping)
+    m = rig.mechanics
+    damping /= 1 - m.mode_mass_fraction if m.mode_frequency else 1
+    if damping / m.mass > FASTEST_RATE:
+        raise ValueError(
+            f"Mechanics.mass = {m.mass!r} is impossible with this friction; allowed: at least "
+            f"{damping / FASTEST_RATE:.3g} kg, or less friction, so that steps of 0.25 ms follow the motion"
+        )
+
+
+def least_dead_volume(rig: "Parameters") -> float:
+    """The least possible of a rig, m3: ``STOP_DEPTH`` of its largest piston."""
+    return STOP_DEPTH * max(rig.cylinder1.area_p, rig.cylinder2.area_p)
+
+
+def follow(parts: dict[str, Any], rig: "Parameters", changes: dict[str, Any]) -> None:
+    """Put into ``parts`` of a changed ``rig`` what hangs on its bores and strokes, as far as ``changes`` do not name it."""
+
+    def part(name: str) -> Any:
+        return parts.get(name, getattr(rig, name))
+
+    def bore(one: Any, other: Any) -> float:
+        return float(max(one.area_p, other.area_p))
+
+    grown = bore(part("cylinder1"), part("cylinder2")) / bore(rig.cylinder1, rig.cylinder2)
+    if grown != 1.0 and "chambers.dead_volume" not in changes:
+        parts["chambers"] = dataclasses.replace(part("chambers"), dead_volume=grown * rig.chambers.dead_volume)
+    g = part("geometry")
+    if not {"geometry.d3", "geometry.d6", "geometry.k1"} & set(changes):
+        room = 1.9 * min(0.98 * (g.d3 + g.d6) - g.k1, g.k1 - 1.05 * abs(g.d3 - g.d6))
+        longer = max(1.0, part("cylinder1").stroke / max(room, rig.cylinder1.stroke))
+        if longer > 1.0:
+            g = dataclasses.replace(g, d3=longer * g.d3, d6=longer * g.d6, k1=longer * g.k1)
+    if part("cylinder2").stroke > rig.cylinder2.stroke and "geometry.k2" not in changes:
+        g = dataclasses.replace(g, k2=max(g.k2, 0.6 * part("cylinder2").stroke))
+    if g is not part("geometry"):
+        parts["geometry"] = g
