@@ -5,7 +5,7 @@ from typing import Any
 import gymnasium
 
 from baselines import make_controller
-from baselines.staged import driving
+from baselines.driving import driving
 
 
 def pipeline() -> str:
