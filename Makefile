@@ -245,7 +245,7 @@ mutation: $(READY)
 	rm -rf $(OUT)/mutation && mkdir -p $(OUT)/mutation
 	git ls-files -z | xargs -0 cp --parents --target-directory $(OUT)/mutation
 	find $(OUT)/mutation -name '*.py' -exec sed -i -E '/^@(kernel|helper)$$/d' {} +
-	cd $(OUT)/mutation && NUMBA_DISABLE_JIT=1 HYPOTHESIS_PROFILE=brief nice $(CURDIR)/$(MUTMUT)/bin/mutmut run --max-children 2 $(MUTANTS)
+	cd $(OUT)/mutation && BIRTHSIM_DEBUG=1 HYPOTHESIS_PROFILE=brief nice $(CURDIR)/$(MUTMUT)/bin/mutmut run --max-children 2 $(MUTANTS)
 	cd $(OUT)/mutation && $(CURDIR)/$(MUTMUT)/bin/mutmut results
 
 # A warning fails it: a page that no list names, a link or an anchor that leads nowhere, a cell that fails.

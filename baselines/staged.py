@@ -1,25 +1,23 @@
-"""What every compiled law shares: lanes, their memory, one rig without lanes, and the stages of a closed loop.
+"""What every compiled controller shares: lanes, their memory, and the stages of a closed loop.
 
-``driving`` puts any controller, compiled or not, into a loop.
+``baselines.driving`` puts any controller, compiled or not, into a loop.
 """
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Controller, checked_command
+from baselines.inputs import COMMAND_OPTIONS, feedforward_rows, lanes_of, one_lane
 from birthsim_env.loop import guard
 from birthsim_env.loop.loop import MixedLoop
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
     FAULT,
-    FEEDFORWARD,
     OPENING,
     REFERENCE,
     Seen,
@@ -29,78 +27,12 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
-from birthsim_env.parts.actuation import Actuation
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.values import is_within, near, problem, shown
+from birthsim_env.physics.rig.values import is_within, near, shown
 from birthsim_env.restored import ANY, Declared
-
-NO_ACTION = np.zeros(0, dtype=np.float32)
-"""What a single environment's ``step`` takes where a controller drives it."""
-
-
-def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measurement, Reference]:
-    """Signals of one rig, which have no lane axis, as signals over one lane."""
-    names = ("time", "position", "position_time", "velocity", "pressures", "user_force", "acceleration")
-    signals = ((name, getattr(measurement, name)) for name in names)
-    columns: dict[str, Any] = {
-        name: signal_of(f"measurement.{name}", one)[..., None] for name, one in signals if one is not None
-    }
-    return replace(measurement, **columns), Reference(signal_of("reference.rows", reference.rows)[..., None])
-
-
-COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
-"""What ``command`` of a law may take besides the signals."""
-
-
-_COUNTS = {"position": 2, "velocity": 2, "pressures": 4, "user_force": 2, "acceleration": 2}
-"""Rows of the fields of a ``Measurement`` that have some."""
-
-
-def lanes_of(measurement: Measurement, reference: Reference) -> int:
-    """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
-    shape = shape_of(measurement.position)
-    if len(shape) != 2:
-        raise ValueError(f"measurement.position has shape {shape}; allowed: (2, N), or (2,) for one rig")
-    lanes = shape[1]
-    for name, count in _COUNTS.items():
-        signal = getattr(measurement, name)
-        if (signal is not None or name != "acceleration") and shape_of(signal) != (count, lanes):
-            raise _of_other_lanes(f"measurement.{name}", signal, count, lanes)
-    if shape_of(reference.rows) != (REFERENCES, lanes):
-        raise _of_other_lanes("reference.rows", reference.rows, REFERENCES, lanes)
-    return lanes
-
-
-def _of_other_lanes(name: str, signal: object, count: int, lanes: int) -> ValueError:
-    allowed = f"allowed: {(count, lanes)}, with the lanes of measurement.position"
-    return ValueError(f"{name} has shape {shape_of(signal)}; {allowed}")
-
-
-def feedforward_rows(
-    lanes: int, force: Array | None = None, rate: Array | None = None, factor: Array | None = None, *, taken: Sequence[str]
-) -> Array:
-    """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
-    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, is no number as large as what is asked for may
-    be, and for what is not ``taken``."""
-    most = guard.MOST["reference"]
-    given = np.zeros((5, lanes))
-    for name, rows, one in zip(COMMAND_OPTIONS, (given[:2], given[2:4], given[4]), (force, rate, factor), strict=True):
-        if one is not None:
-            if name not in taken:
-                raise ValueError(f"{name} is given; allowed: {' and '.join(taken) or 'nothing'} besides the signals")
-            if shape_of(one) != rows.shape:
-                raise ValueError(
-                    f"{name} has shape {shape_of(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
-                )
-            rows[:] = signal_of(name, one)
-            wrong = ~(np.abs(rows) <= most)
-            if wrong.any():
-                raise ValueError(f"{name} has {rows[wrong][0]:g}; allowed: finite numbers, at most {most:g}")
-    return given
 
 
 @dataclass(frozen=True)
@@ -353,71 +285,3 @@ def ask(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: 
         for k in range(Reference.size):
             seen.asked.rows[k, i] = seen.reference.rows[k, i]
     return 0
-
-
-class Driving(Actuation):
-    """A controller as an actuation, called back once per control period. A policy step has no action.
-
-    With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``options`` are those of
-    ``command``. ``spent`` has the time of each call, us per lane.
-    """
-
-    size, every_period = 0, True
-    names: tuple[str, ...] = ()
-    in_state: ClassVar[Declared] = {"spent": None}
-
-    def __init__(self, controller: Controller, name: str | None, options: dict[str, Array]) -> None:
-        self.controller, self._name, self._options, self.spent = controller, name, options, list[float]()
-
-    def begin(self, lanes: Mask) -> None:
-        self.controller.reset(None if lanes.all() else lanes)
-
-    def accept(self, actions: Array) -> None:
-        pass
-
-    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
-        started = time.perf_counter()
-        try:
-            command = self.controller.command(measurement, reference, **self._options)
-        except (ValueError, MemoryError):
-            raise
-        except Exception as error:
-            if self._name is None:
-                raise
-            raise ValueError(
-                f"controller {self._name!r}: command() fails ({problem(error)}); allowed: openings (4, lanes)"
-            ) from error
-        self.spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
-        return command if self._name is None else checked_command(self._name, command, plant.num_envs)
-
-
-class CompiledDriving(Driving):
-    """A ``StagedController`` as an actuation: its stages are part of the loop."""
-
-    controller: StagedController
-
-    def stages(self, lanes: int, sampled: bool, foreign: bool) -> list[Part]:
-        """The law, compiled into the closed loop; what sensors of the package measure needs no guard."""
-        self.controller.prepare(lanes, sampled)
-        return self.controller.stages() if foreign else self.controller.inner_stages()
-
-    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        """Arrays that the loop places in rows of ``Seen``."""
-        own = self.controller.more_rows(lanes)
-        if self.controller.asks:
-            return own
-        force, rate, factor = map(self._options.get, COMMAND_OPTIONS)
-        return [(feedforward_rows(lanes, force, rate, factor, taken=self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
-
-    def explain(self, measurement: Measurement, reference: Reference) -> None:
-        self.controller.refuse(measurement, reference)
-
-    def check(self, measurement: Measurement) -> None:
-        """Raise ``ValueError`` where episodes begin with less than the law has to measure."""
-        self.controller.require_acceleration(measurement)
-
-
-def driving(controller: Controller, name: str | None, options: dict[str, Array] | None = None) -> Driving:
-    """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
-    compiled = isinstance(controller, StagedController) and controller.is_compiled()
-    return (CompiledDriving if compiled else Driving)(controller, name, options or {})

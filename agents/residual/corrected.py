@@ -16,9 +16,10 @@ from agents.residual import authority, features, unexplained
 from agents.residual.pistons import ObservedPistons, observed
 from agents.residual.settings import NO_LAW, ResidualSettings
 from baselines.controller import require_stiffness
+from baselines.driving import CompiledDriving
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
-from baselines.staged import CompiledDriving, ControllerStage, StagedController
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import ACTION, SHOWN, Seen
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import scratch

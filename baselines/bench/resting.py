@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.controller import Controller
-from baselines.staged import driving
+from baselines.driving import driving
 from birthsim_env.loop.loop import MixedLoop, available_threads
 from birthsim_env.loop.rows import ASKED, REFERENCE, TIME
 from birthsim_env.loop.signals import Reference

@@ -26,10 +26,11 @@ import numpy as np
 
 from baselines.controller import Controller, checked_command
 from baselines.impedance import Impedance, declared_by
+from baselines.inputs import lanes_of, one_lane
 from baselines.limiter import air_spring
 from baselines.limiter.past import recall, slots_of
 from baselines.limiter.port_energy import Energy, Work, count_work
-from baselines.staged import ControllerStage, StagedController, lanes_of, one_lane
+from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerChamber, Point, Reference
 from birthsim_env.loop.stage import Part, Stage, block, scratch

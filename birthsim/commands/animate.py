@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from PIL import Image
 from tqdm import tqdm
 
-from baselines.staged import NO_ACTION
+from baselines.driving import NO_ACTION
 from birthsim.command_line.settings import CONTROLLER, RANDOMIZE, Env, Parts, Randomize, RigFile, Seed, Sensors, Set, number
 from birthsim.command_line.worlds import check_environment, with_options
 from birthsim.recorded import driven

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from tqdm import tqdm
 
+from baselines.driving import NO_ACTION
 from baselines.registry import compiled_names
-from baselines.staged import NO_ACTION
 from birthsim.recorded import driven
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -12,7 +12,7 @@ from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import metrics_of
 from baselines.controller import CommandFunction, Controller, controller_of
-from baselines.staged import driving
+from baselines.driving import driving
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.machine import machine_named

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.staged import Driving, driving
+from baselines.driving import Driving, driving
 from birthsim_build.device.program import Pieces
 from birthsim_build.loops import compiled_law
 from birthsim_env.assembly import assemble

@@ -229,7 +229,7 @@ def _told(part: Part | None) -> tuple[str, str, str]:
     if isinstance(part, Stage):
         function: Any = getattr(part.function, "py_func", part.function)
         named = ", ".join(layout.__name__ for layout in layouts_of(part.function) if layout)
-        memory = "" if part.memory is None else f"{len(part.memory)} rows"
+        memory = f"{len(part.memory)} rows" if part.memory is not None and len(part.memory) else ""
         return f"{function.__module__}:{function.__qualname__}{' (plain Python)' if DEBUG else ''}", named, memory
     if isinstance(part, Called):
         return f"{type(part.owner).__module__}:{type(part.owner).__qualname__}.{part.method} (Python)", "", ""

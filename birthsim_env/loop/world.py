@@ -1,5 +1,7 @@
 """Stages of the world: the plant with its clock, and what jumps."""
 
+from functools import cache
+
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, scratch, table2
@@ -214,13 +216,18 @@ def _jumps(
     return 0
 
 
+@cache
+def _jump_detection(period: float, jump_rate: float, begins: bool) -> Array:
+    """Its constants, which are the same in every episode."""
+    return JumpDetection.numbers(period=period, change=jump_rate * period, begins=begins)
+
+
 def jump_stage(period: float, jump_rate: float, memory: Array, begins: bool) -> Stage:
     """Counts the time since the force changed faster than ``jump_rate``, N/s, or a closed-loop setpoint changed at all.
 
     ``memory`` (5, N) is ``PreviousSetpoints``; where an episode ``begins`` it is only written.
     """
-    constants = JumpDetection.numbers(period=period, change=jump_rate * period, begins=begins)
-    return Stage(_jumps, constants, memory)
+    return Stage(_jumps, _jump_detection(period, jump_rate, begins), memory)
 
 
 @kernel

@@ -13,6 +13,7 @@ from _generate.environments import environments
 from _generate.metrics import metrics
 from _generate.page import page
 from _generate.pictures import pictures
+from _generate.pipeline import pipeline
 from _generate.readers import readers
 from _generate.rig import options, rig
 from _generate.root_pages import PAGES, root_page
@@ -29,6 +30,7 @@ PARTS = {
     "metrics.md": metrics,
     "options.md": options,
     "page.md": page,
+    "pipeline.md": pipeline,
     "readers.md": readers,
     "rig.md": rig,
     **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},

@@ -7,7 +7,7 @@ from PIL import Image
 
 import birthsim_env
 from baselines import make_controller
-from baselines.staged import NO_ACTION, driving
+from baselines.driving import NO_ACTION, driving
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.registry import names
 

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 import birthsim_env
+from baselines.driving import driving
 from baselines.registry import make_controller
-from baselines.staged import driving
 from birthsim import recorded
 from birthsim.commands import animate
 from birthsim.commands.animate import SAMPLE, take

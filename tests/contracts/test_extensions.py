@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from baselines import evaluate, make_controller
-from baselines.staged import driving
+from baselines.driving import driving
 from birthsim_env import Parameters, registry
 
 KINDS = ("scenario", "sensors")

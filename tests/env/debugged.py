@@ -10,7 +10,7 @@ import numpy as np
 import agents  # noqa: F401  registers the residual environments
 import birthsim_env
 from baselines import evaluate, make_controller
-from baselines.staged import driving
+from baselines.driving import driving
 from birthsim_env.parts.hands.user_forces import UserForce
 
 RIG = birthsim_env.Parameters()

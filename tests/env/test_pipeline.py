@@ -9,7 +9,7 @@ import pytest
 
 from baselines import make_controller
 from baselines.bench.measures import Measures
-from baselines.staged import driving
+from baselines.driving import driving
 from birthsim_env import Circle, Parameters
 from birthsim_env.loop.pipeline import ORDER, Pipeline, Step
 from birthsim_env.loop.rows import Seen, World

@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import birthsim_env
+from baselines.driving import driving
 from baselines.registry import make_controller
-from baselines.staged import driving
 from birthsim_env.restored import generator_complaint
 from birthsim_env.state import give_state, take_state
 from tests.contracts.test_environments import WORLDS, made

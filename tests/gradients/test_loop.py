@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import agents  # noqa: F401  registers the residual environments
+from baselines.driving import driving
 from baselines.registry import make_controller
-from baselines.staged import driving
 from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names

@@ -6,9 +6,9 @@ import gymnasium
 import numpy as np
 import pytest
 
+from baselines.driving import CompiledDriving, Driving, driving
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import bare_name, known_options, make_controller
-from baselines.staged import CompiledDriving, Driving, driving
 from birthsim_env import Measurement, Parameters
 from birthsim_env.loop.rows import Signals, fill_measurement
 from lab.studies.haptics.worlds import resting

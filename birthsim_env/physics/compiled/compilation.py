@@ -95,9 +95,9 @@ def kernel(function: F) -> F:
         return plain(function)
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     folder = cache_folder()
-    # With the compiler off there is nothing to keep; what a closure or an interactive session holds, no hash of sources knows.
+    # What a closure or an interactive session holds, no hash of sources knows.
     written = Path(function.__code__.co_filename).is_file()
-    if folder is not None and hasattr(compiled, "_cache") and function.__closure__ is None and written:
+    if folder is not None and function.__closure__ is None and written:
         compiled._cache = _DiskCache(function, folder)
     return compiled  # type: ignore[no-any-return]
 
@@ -143,9 +143,7 @@ class _Helper(CPUDispatcher):
 
 def helper(function: F) -> F:
     """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
-    if DEBUG or numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return kernel(function)
-    return _Helper(function)  # type: ignore[return-value]
+    return plain(function) if DEBUG else _Helper(function)  # type: ignore[return-value]
 
 
 def over(function: Callable[..., Any], *arguments: Any) -> None:
