@@ -9,6 +9,7 @@ attribute made from a string, or what another process runs. An entry of the regi
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, partial
 from hashlib import sha256
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -78,16 +79,23 @@ def _reached(roots: frozenset[str], used: tuple[tuple[str, str], ...]) -> dict[s
 @cache
 def _next(place: Place) -> frozenset[Place]:
     """What a definition refers to, and what its file runs on import."""
-    path = sources.ROOT / place.file
-    one = definitions(path).defined[place.name]
-    found = {Place(place.file, name) for name in (*one.own, ON_IMPORT) if name in definitions(path).defined}
-    for name in one.others:
-        found |= _registering() if name == MAKES else frozenset() if name == REGISTERS else _resolved(name)
-    # What a later package has under that name, those who use it import.
+    known = definitions(sources.ROOT / place.file).defined
+    found = set(_referred(place)) | {Place(place.file, name) for name in known if name == ON_IMPORT}
+    # What a later package has under a name, or registers, those who use it import.
     packages = sources.PACKAGES[: sources.PACKAGES.index(place.file.partition("/")[0]) + 1]
-    for name in one.named:
+    for name in known[place.name].named:
         found |= _named(name) if name.partition(".")[0] in packages else frozenset()
+    if MAKES in _others(place):
+        found |= {one for one in _registering() if one.file.partition("/")[0] in packages}
     return frozenset(found - {place})
+
+
+@cache
+def _referred(place: Place) -> frozenset[Place]:
+    """Where the names lead that stand in a definition."""
+    one = definitions(sources.ROOT / place.file).defined[place.name]
+    found = {Place(place.file, name) for name in one.own}
+    return frozenset(found.union(*(_resolved(name) for name in one.others if name not in (MAKES, REGISTERS))))
 
 
 def _named(name: str) -> frozenset[Place]:
@@ -105,7 +113,7 @@ def _resolved(name: str) -> frozenset[Place]:
             break
     else:
         return frozenset()
-    file, rest = path.relative_to(sources.ROOT).as_posix(), words[count:]
+    file, rest = _file(path), words[count:]
     if file.startswith(UNDECIDING):
         return frozenset()
     known = definitions(path)
@@ -124,17 +132,29 @@ def _entered(entry: str, module: str) -> frozenset[Place]:
         known = definitions(path)
         for name in (entry, f"{entry.partition('=')[0]}=*"):
             if name in known.entries:
-                return frozenset({Place(path.relative_to(sources.ROOT).as_posix(), known.entries[name])})
+                return frozenset({Place(_file(path), known.entries[name])})
     return _resolved(module)
 
 
 @cache
 def _registering() -> frozenset[Place]:
-    """The definitions that register ids of environments."""
-    found = set()
-    for package in sources.PACKAGES[:-1]:
-        for path in (sources.ROOT / package).rglob("*.py"):
-            if b"gymnasium" in path.read_bytes():
-                file = path.relative_to(sources.ROOT).as_posix()
-                found |= {Place(file, name) for name, one in definitions(path).defined.items() if REGISTERS in one.others}
+    """The definitions that register ids of environments, and those that call them."""
+    files = [path for package in sources.PACKAGES[:-1] for path in (sources.ROOT / package).rglob("*.py")]
+    found, words = set[Place](), {b"gymnasium"}
+    while words:
+        naming = [path for path in files if any(word in path.read_bytes() for word in words)]
+        every = {
+            Place(path.relative_to(sources.ROOT).as_posix(), name) for path in naming for name in definitions(path).defined
+        }
+        new = {one for one in every - found if REGISTERS in _others(one) or not found.isdisjoint(_referred(one))}
+        found |= new
+        words = {one.name.encode() for one in new}
     return frozenset(found)
+
+
+def _others(place: Place) -> list[str]:
+    return definitions(sources.ROOT / place.file).defined[place.name].others
+
+
+def _file(path: Path) -> str:
+    return path.relative_to(sources.ROOT).as_posix()

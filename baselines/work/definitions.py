@@ -79,7 +79,7 @@ def _read(content: bytes) -> Definitions:
     statements: dict[str, list[ast.stmt]] = {}
     imported: dict[str, str] = {}
     on_import, entries = list[ast.stmt](), dict[str, str]()
-    loaded = list[str]()
+    loaded, handed_over = list[str](), list[str]()
     for statement in ast.parse(content).body:
         if is_prose(statement) or _is_script(statement):
             continue
@@ -91,15 +91,18 @@ def _read(content: bytes) -> Definitions:
             names.insert(0, registered[0])
         elif _runs(statement):
             on_import.append(statement)
+        handed_over += names if _is_handed_over(statement, imported) else []
         entries |= {entry: names[0] for entry in registered}
         for name in names:
             statements.setdefault(name, []).append(statement)
-    if on_import or loaded:
+    if on_import or loaded or handed_over:
         statements[ON_IMPORT] = on_import
     defined = {name: _definition(group, imported, set(statements)) for name, group in statements.items()}
-    if loaded:  # ``import package.module`` may be there for what that module runs
-        own = defined[ON_IMPORT]
-        defined[ON_IMPORT] = own._replace(others=sorted({*own.others, *(f"{name}.{ON_IMPORT}" for name in loaded)}))
+    if ON_IMPORT in defined:
+        one = defined[ON_IMPORT]
+        # ``import package.module`` may be there for what that module runs.
+        others = sorted({*one.others, *(f"{name}.{ON_IMPORT}" for name in loaded)})
+        defined[ON_IMPORT] = one._replace(own=sorted({*one.own, *handed_over}), others=others)
     return Definitions(defined, {alias: name for alias, name in imported.items() if _counts(name)}, entries)
 
 
@@ -199,6 +202,14 @@ def _registered(statement: ast.AST, imported: dict[str, str]) -> Iterator[str]:
             if imported.get(root, "") + dot + rest == _REGISTER:
                 kinds = [word for word in one.keywords if word.arg in registry.ROOMS]
                 yield from (f"{word.arg}={_text(word.value) or '*'}" for word in kinds)
+
+
+def _is_handed_over(statement: ast.stmt, imported: dict[str, str]) -> bool:
+    """Whether a decorator hands what it stands above to Numba's compiler, which calls it by the types that it meets."""
+    decorators = getattr(statement, "decorator_list", [])
+    called = [one.func if isinstance(one, ast.Call) else one for one in decorators]
+    roots = (next(_dotted(one), "").partition(".")[0] for one in called)
+    return any(imported.get(root, "").startswith(("numba.core.", "numba.extending.")) for root in roots)
 
 
 def _is_script(statement: ast.stmt) -> bool:

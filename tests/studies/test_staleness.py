@@ -94,11 +94,25 @@ TREE = {
             last = 1.0
         """,
     "birthsim_env/__init__.py": """
-        from gymnasium.envs import registration
+        from birthsim_env.ids import register_id
         from birthsim_env.scaling import scaled
 
-        for _name in ("Circle",):
-            registration.register(_name, entry_point="birthsim_env.env:Env")
+        register_id("birthsim_env.env:Env")
+        """,
+    "birthsim_env/ids.py": """
+        from gymnasium.envs import registration
+
+        def register_id(where):
+            registration.register("Circle", entry_point=where)
+        """,
+    "agents/__init__.py": """
+        from birthsim_env.ids import register_id
+
+        register_id("agents.residual:Residual")
+        """,
+    "agents/residual.py": """
+        class Residual:
+            pass
         """,
     "birthsim_env/scaling.py": """
         def scaled(value, by=2.0):
@@ -120,7 +134,12 @@ TREE = {
         """,
     "birthsim_env/plant.py": '''
         from numba import njit
+        from numba.extending import overload
         from birthsim_env import logs
+
+        @overload(len)
+        def _length(rig):
+            return lambda rig: 4
 
         TABLE = {"a": 1.0}
 
@@ -232,6 +251,7 @@ def test_an_edit_of_what_is_not_called_leaves_a_result_fresh(tree, file, old, ne
     [
         ("birthsim_env/plant.py", "* limit", "+ limit", "birthsim_env/plant.py:advance"),
         ("birthsim_env/plant.py", "njit(function)", "function", "birthsim_env/plant.py:kernel"),
+        ("birthsim_env/plant.py", "rig: 4", "rig: 5", "birthsim_env/plant.py:_length"),
         ("birthsim_env/plant.py", '"a": 1.0', '"a": 2.0', "birthsim_env/plant.py:TABLE"),
         ("birthsim_env/generated.py", "return value", "return -value", "birthsim_env/generated.py:inner"),
         ("birthsim_env/generated.py", "1.0", "4.0", "birthsim_env/generated.py:outer"),
@@ -278,7 +298,11 @@ def test_who_makes_environments_by_id_calls_what_registers_the_ids(tree):
     before = result([made])
     tree("birthsim_env/env.py", "1.0", "2.0")
     assert changed(before, [made]) == ["birthsim_env/env.py:Env"]
-    assert changed(result([made]), [made]) == []
+    before = result([made])
+    tree("agents/residual.py", "pass", "step = 1")
+    assert changed(before, [made]) == [], "a package above registers for those who import it"
+    tree("birthsim_env/ids.py", '"Circle"', '"Probe"')
+    assert changed(before, [made]) == ["birthsim_env/ids.py:register_id"]
 
 
 def test_an_entry_that_moved_away_makes_a_result_stale(tree):
