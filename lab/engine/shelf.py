@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from birthsim.command_line.command import perform_with
 from birthsim.command_line.settings import Configured
@@ -65,8 +65,15 @@ def state(name: str) -> str:
     listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
     usual = json.loads(json.dumps(study.options))
     other = {key: value for key, value in content["settings"].items() if key not in usual or value != usual[key]}
-    said = "".join(f"; {shown(key)} = {shown(value)}, not {usual.get(key, 'an option')}" for key, value in other.items())
+    said = "".join(_unlike(key, value, usual.get(key)) for key, value in other.items())
     return (f"stale; changed: {listed}" if files else "fresh") + said
+
+
+def _unlike(option: str, measured: Any, usual: Any) -> str:
+    """How a result's option differs from the one that a run has now: one that came after it is lacking, which is not stale."""
+    if isinstance(measured, list) and isinstance(usual, list) and all(one in usual for one in measured):
+        return f"; lacks {', '.join(str(one) for one in usual if one not in measured)}"
+    return f"; {shown(option)} = {shown(measured)}, not {'an option' if usual is None else usual}"
 
 
 def status() -> None:

@@ -134,7 +134,10 @@ def test_a_recipe_is_all_that_it_takes(recipe, tree, tmp_path):
 @pytest.mark.slow
 def test_a_controller_that_is_registered_makes_no_result_stale(tree, tmp_path):
     line = ("-m", "birthsim", "study", "status")
-    assert run_in(performed("controller", tree, tmp_path), *line) == run_in(tree, *line)
+    (status, said), (plain, before) = (run_in(place, *line) for place in (performed("controller", tree, tmp_path), tree))
+    assert (status, plain) == (0, 0), said + before
+    assert "; lacks adrc" in said  # of what measures every controller
+    assert said.replace("; lacks adrc", "") == before
 
 
 @pytest.mark.slow
