@@ -10,9 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import FORCE, MOTION, STATE, TICK, Seen, Signals, World, measurement_of
-from birthsim_env.loop.signals import Measurement
+from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
@@ -208,15 +206,9 @@ class BoardSensors(SensorModel):
         errors.acceleration_bias[:], errors.acceleration_gain[:] = drawn[:2], drawn[2:]
         self._errors[:, lanes] = errors.rows
 
-    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
-        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
-        seen = np.zeros((Signals.size, len(time)))
-        Signals(seen).time[:] = time
-        cells = [(pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES)]
-        world = [(ticks[None], TICK), (motion, MOTION), (force, FORCE), *cells]
-        placed = [(np.ascontiguousarray(array, dtype=np.float64), row) for array, row in world]
-        Loop(len(time), placed, [(seen, 0)], [self.stage()]).run()
-        return measurement_of(seen, True, Shared(self._shared).share > 0.0)
+    @property
+    def tells_acceleration(self) -> bool:
+        return Shared(self._shared).share > 0.0
 
     def stage(self) -> Stage:
         tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)

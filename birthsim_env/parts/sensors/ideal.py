@@ -1,14 +1,10 @@
 """The sensor model ``ideal``, which sees everything at every control period."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from birthsim_env.loop.rows import Seen, World
-from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PRESSURES, Array
+from birthsim_env.physics.compiled.lanes import PRESSURES
 from birthsim_env.registry import register
 
 
@@ -29,9 +25,6 @@ def ideal_stage(world: World, seen: Seen, memory: int, constants: int, tables: i
 @register(sensors="ideal", about="Every quantity is known exactly and at once.", order=1)
 class IdealSensors(SensorModel):
     """Position, velocity, pressures and the user's force, exact and at once."""
-
-    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
-        return Measurement(time, motion[:2], time, motion[2:], pressures, force, sampled=False)
 
     def stage(self) -> Stage:
         return Stage(ideal_stage)

@@ -9,10 +9,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import FORCE, MOTION, STATE, TICK, Signals, measurement_of
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, Staged
 from birthsim_env.parts.drawn.seeding import vectorised
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.registry import entries, entry
 
@@ -20,9 +22,9 @@ from birthsim_env.registry import entries, entry
 class SensorModel(Staged):
     """What measures the rig, and may stand between a controller's openings and the valves too.
 
-    ``measure`` alone makes a sensor model; all else has the defaults that stand here. A ``stage`` is ``measure``, and a
-    ``board_stage`` is ``put_out``, compiled into the closed loop; without one the loop stops for the method in Python. So it
-    does for a class that derives from a compiled model and overrides the method but not the stage.
+    ``measure`` alone makes a sensor model, and so does ``stage``, which is the same, compiled into the closed loop; all else
+    has the defaults that stand here. Without a stage the loop stops for ``measure`` in Python. So it does for a class that
+    derives from a compiled model and overrides ``measure`` alone. ``board_stage`` is ``put_out``, in the same way.
 
     Parameters
     ----------
@@ -50,7 +52,7 @@ class SensorModel(Staged):
         """Start a new episode in one lane, with that lane's own random stream."""
 
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
-        """What the sensors say.
+        """What the sensors say: by default what the ``stage`` does.
 
         Parameters
         ----------
@@ -65,7 +67,23 @@ class SensorModel(Staged):
         force : array (2, N)
             Of the hand on the end effector, N.
         """
-        raise NotImplementedError(f"{type(self).__name__}.measure(ticks, time, motion, pressures, force) is missing")
+        stage = self.stage()
+        if stage is None:
+            raise NotImplementedError(
+                f"{type(self).__name__} has neither measure(ticks, time, motion, pressures, force) nor stage()"
+            )
+        seen = np.zeros((Signals.size, len(time)))
+        Signals(seen).time[:] = time
+        cells = [(pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES)]
+        world = [(ticks[None], TICK), (motion, MOTION), (force, FORCE), *cells]
+        placed = [(np.ascontiguousarray(array, dtype=np.float64), row) for array, row in world]
+        Loop(len(time), placed, [(seen, 0)], [stage]).run()
+        return measurement_of(seen, self.sampled, self.tells_acceleration)
+
+    @property
+    def tells_acceleration(self) -> bool:
+        """Whether the ``stage`` measures the acceleration of the end effector."""
+        return False
 
     @property
     def has_board(self) -> bool:
