@@ -16,8 +16,10 @@ def with_plugins(monkeypatch, *modules, kinds=("controller", "policy")):
     monkeypatch.setattr(registry, "entry_points", lambda group: points if group == registry.PLUGINS else [])
 
 
-def registered(monkeypatch, made, about="of a test", **named):
+def registered(monkeypatch, made, about="of a test", needs=(), **named):
     """As ``registry.register(kind="name", about=...)(made)`` until the test ends; it may take the place of another entry."""
     ((kind, name),) = named.items()
-    monkeypatch.setitem(registry._ENTRIES[kind], name, registry.Entry(kind, name, made, about, module=__name__))
+    monkeypatch.setitem(
+        registry._ENTRIES[kind], name, registry.Entry(kind, name, made, about, frozenset(needs), module=__name__)
+    )
     return made

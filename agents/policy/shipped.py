@@ -3,12 +3,12 @@
 Nothing here needs the extra that policies need, so that lists are the same without it.
 """
 
-import json
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from baselines.staged import StagedController
+from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import LAST, names, register
 
@@ -39,7 +39,7 @@ def residual(parameters: Parameters, policy: Any = "circle", settings: Any = Non
 
 def _register(folder: Path) -> None:
     """The policies of a folder of seeds, by what their training says."""
-    training = json.loads(next(folder.glob("seed_*/training.json")).read_text(encoding="utf-8"))["settings"]
+    training = read_json("policy", next(folder.glob("seed_*/training.json")), {"settings": dict})["settings"]
     needs = {AGENTS, "force sensor"} if training.get("force_sensor", True) else {AGENTS}
     about = f"A controller and a trained policy that corrects it: {folder.name}."
     register(policy=folder.name, about=about, needs=needs)(folder)

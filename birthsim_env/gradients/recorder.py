@@ -22,7 +22,6 @@ from birthsim_env.gradients.traced import Traced, trace
 from birthsim_env.loop.rows import ACTION, MOTION, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics.compiled.lanes import STATES, Array
-from birthsim_env.physics.rig.values import shown
 from birthsim_env.reward import Terms
 from birthsim_env.simulation import Simulation
 
@@ -108,9 +107,7 @@ class Recorder:
             if step.part is None:
                 continue
             if not isinstance(step.part, Stage):
-                raise ValueError(
-                    f"step {step.name!r} = {shown(step.part)}, in Python, cannot be differentiated; allowed: a Stage"
-                )
+                raise ValueError(f"step {step.name!r} is a user's own part, in Python: no derivative; allowed: a Stage")
             if step.closes:
                 closing.append(step.part)
             else:

@@ -10,6 +10,7 @@ from lab.studies.comparison import figure as comparison_figures
 from lab.studies.comparison.grid import METRICS, REFERENCE, Conditions, costs, gather, statistics
 from lab.studies.comparison.tables import losses, overview
 from tests.controllers.test_named_controllers import OWN
+from tests.registered import registered
 
 RIG = Parameters()
 CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
@@ -39,6 +40,13 @@ def result(lost=(False, False, False), cost=1.0, **metrics):
     """What run_cell returns: metrics that are not named say nothing."""
     columns = {name: [None] * len(lost) for name in METRICS if name != "hunting"}
     return {"seeds": [0, 1, 2], "metrics": {**columns, **metrics}, "lost": list(lost), "cost": cost}
+
+
+@pytest.fixture(autouse=True)
+def names(monkeypatch):
+    """Of the controllers below, as tables ask what they need."""
+    for name in ("other", "worst"):
+        registered(monkeypatch, object, needs={"force sensor"}, controller=name)
 
 
 @pytest.fixture

@@ -134,7 +134,7 @@ def told(monkeypatch):
         beliefs.append(self.feedforward[:4])
         return openings
 
-    monkeypatch.setattr(ResidualActuation, "stages", None)
+    monkeypatch.setattr(ResidualActuation, "stages", lambda *_: None)
     monkeypatch.setattr(CorrectedController, "command", spied)
     return beliefs
 

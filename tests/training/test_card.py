@@ -38,7 +38,7 @@ def test_the_hub_reads_what_was_measured_and_readers_where_it_is_worse(name):
 
 
 def test_a_lost_episode_is_infinitely_bad():
-    lost = measured("this policy", [0.2, 0.4, 9.0], 30.0)
+    lost = measured("pid", [0.2, 0.4, 9.0], 30.0)
     lost.lost = [True, True, False]
     card = model_card(best_policy("circle"), "circle", [measured("this policy", [0.2] * 3, 30.0), lost])
     assert "| settled error, median, mm | 0.2 | lost |" in card

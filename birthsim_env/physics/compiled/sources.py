@@ -49,7 +49,7 @@ def remembered(path: Path, content: bytes, kind: str, read: Callable[[bytes], An
     if folder is None:
         return read(content)
     place = hashlib.sha256(str(path).encode()).hexdigest()[:8]
-    found = hashlib.sha256(b"".join(reader.read_bytes() for reader in readers) + content).hexdigest()[:16]
+    found = hashlib.sha256(b"".join(own.read_bytes() for own in readers) + content).hexdigest()[:16]
     file = folder / f"{path.stem}_{place}-{found}.{kind}"
     if (held := kept(file)) is not None:
         return json.loads(held)

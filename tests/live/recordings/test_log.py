@@ -30,7 +30,7 @@ def files(tmp_path_factory):
     for name in ("pid", "backstepping"):
         task = pieces.evaluation_tasks(name, pieces.controller_settings(name, rig), "BirthSIM/Probe-v2", {}, 2, 7)[0]
         result = task.work(**task.settings)
-        tasks._write(folder / f"{name}.json", task, result)
+        tasks._write(folder / f"{name}.json", task, result, {})
         results.append(pieces.gathered(name, [result]).to_dict())
     results[0]["episodes"]["hunting_x"][1] = float("nan")
     results[0]["episodes"]["air"] = [np.nextafter(0.1, 1), -0.0]
