@@ -2,7 +2,7 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy and, by gradients, a controller from scratch, and evaluates them
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make fuzz tries odd input on everything that is read or called, and make kills disturbs every command at random moments (hours)
-# make mutation changes the physics to see whether a test fails (an hour or so); make soak runs 10^8 policy steps (half an hour)
+# make mutation changes physics and controllers to see whether a test fails (hours); make soak runs 10^8 policy steps (half an hour)
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds, of built code too
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
@@ -238,13 +238,14 @@ page: $(READY)
 fuzz: $(READY)
 	HYPOTHESIS_PROFILE=deep nice $(BIN)/python -m pytest -v --hypothesis-seed=$${SEED:-0} tests/fuzz
 
-# mutmut leaves functions with decorators alone: in the copy kernels have none, and are plain Python. Tests that take long are skipped.
+# mutmut leaves functions with decorators alone: in the copy those files' kernels have none, and all are plain Python. Tests that
+# take long without machine code are skipped. MUTANTS="birthsim_env.physics.valves*" names some.
 mutation: $(READY)
 	test -x $(MUTMUT)/bin/mutmut || { python3 -m venv $(MUTMUT) && echo "$(CURDIR)/$(VENV)/lib/$$(ls $(VENV)/lib)/site-packages" > \
 	  $(MUTMUT)/lib/$$(ls $(MUTMUT)/lib)/site-packages/project.pth && $(MUTMUT)/bin/pip install --quiet mutmut==3.8.1; }
 	rm -rf $(OUT)/mutation && mkdir -p $(OUT)/mutation
 	git ls-files -z | xargs -0 cp --parents --target-directory $(OUT)/mutation
-	find $(OUT)/mutation -name '*.py' -exec sed -i -E '/^@(kernel|helper)$$/d' {} +
+	cd $(OUT)/mutation && sed -i -E '/^@(kernel|helper)$$/d' $$(sed -n '/^only_mutate/,/^]/p' pyproject.toml | grep -o '[a-z_/]*\.py')
 	cd $(OUT)/mutation && BIRTHSIM_DEBUG=1 HYPOTHESIS_PROFILE=brief nice $(CURDIR)/$(MUTMUT)/bin/mutmut run --max-children 2 $(MUTANTS)
 	cd $(OUT)/mutation && $(CURDIR)/$(MUTMUT)/bin/mutmut results
 

@@ -2,8 +2,8 @@
 
 import inspect
 import os
-import pkgutil
 import signal
+import tomllib
 from collections import Counter
 from importlib import import_module
 
@@ -16,7 +16,7 @@ import gymnasium
 import pytest
 from hypothesis import settings
 
-from birthsim_env import physics
+from birthsim_env.physics.compiled.plain import plain
 from tests.console import ROOT, run
 from tests.live import browser
 
@@ -95,11 +95,15 @@ def brief(monkeypatch):
 
 
 def pytest_sessionstart():
-    """Mutants are plain functions, of which tests ask what they ask of kernels."""
+    """Kernels of files that mutmut changes have lost their decorator: they are made plain, as those of other files are."""
     if MUTANTS:
-        for module in pkgutil.walk_packages(physics.__path__, f"{physics.__name__}."):
-            for function in filter(inspect.isfunction, vars(import_module(module.name)).values()):
-                function.py_func = function
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+        for path in project["tool"]["mutmut"]["only_mutate"]:
+            module = import_module(path.removesuffix(".py").replace("/", "."))
+            for _, function in inspect.getmembers(module, inspect.isfunction):
+                if function.__module__ == module.__name__:
+                    function.py_func = inspect.unwrap(function)
+                    plain(function.py_func)
 
 
 @pytest.fixture(autouse=MUTANTS)
