@@ -48,6 +48,11 @@ def _scored() -> dict[str, Any]:
     }
 
 
+def is_scored(environment: str) -> bool:
+    """Whether there are scores of an environment; a scenario that studies do not measure has none."""
+    return environment in _scored()
+
+
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
     """What controllers reach in an environment, as it was measured.
 

@@ -16,7 +16,7 @@ from birthsim_env import __version__, reference_scores
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
-from birthsim_env.scores import BEST, SENSORS
+from birthsim_env.scores import BEST, SENSORS, is_scored
 
 TRAINING = "training.json"
 """What a training writes beside a policy."""
@@ -52,8 +52,10 @@ def compared(folder: Path) -> list[Evaluation]:
         problem = f"policy = {shown(str(folder))}: its {TRAINING} has no rig ({error})"
         raise ValueError(f"{problem}; allowed: as birthsim train writes it") from error
     place = policy.environment.replace("Residual", "")
-    best = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], bool(randomize))[BEST]["controller"]
-    beside = [policy.settings.law, "backstepping", *["admittance-sensorless"] * (not policy.settings.force_sensor), best]
+    beside = [policy.settings.law, "backstepping", *["admittance-sensorless"] * (not policy.settings.force_sensor)]
+    if is_scored(place):
+        known = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], bool(randomize))
+        beside.append(known[BEST]["controller"])
     controllers = {"this policy": make_controller("residual", rig, policy=str(folder))}
     controllers |= {name: make_controller(name, rig) for name in beside if name != NO_LAW}
     return [

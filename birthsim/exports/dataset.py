@@ -85,9 +85,10 @@ def main(settings: Settings) -> None:
     out, name = make_folder(settings.out).resolve(), f"birthsim/{policy_of(settings.env)}/{settings.level}-v0"
     if (out / name).exists():
         raise ValueError(f"--out {str(settings.out)!r} has {name} already; allowed: another folder")
+    known = reference_scores(settings.env)
     episodes = list(recorded(settings.env, settings.level, range(settings.seed, settings.seed + settings.episodes)))
     check_room(episodes, out)
-    known, text = reference_scores(settings.env), card(settings, name, episodes)
+    text = card(settings, name, episodes)
     buffers = [
         EpisodeBuffer(
             k, one.seed, None, one.observations, one.actions, list(one.rewards), *ends(one.terminated, len(one.rewards))

@@ -19,8 +19,9 @@ from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.noise import Noise
+from birthsim_env.parts.hands.pulls import Pulls
 from birthsim_env.parts.hands.steps import AlternatingSteps
-from birthsim_env.parts.hands.user_forces import Pulls, Ramp
+from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.physics.rig.parameters import DECLARED
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.vector_env import BirthSIMVectorEnv

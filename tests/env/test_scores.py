@@ -11,9 +11,10 @@ from baselines import evaluate, make_controller
 from baselines.bench.measures import DISCOUNTS
 from birthsim_env import Parameters, Reference
 from birthsim_env.loop.rows import World
-from birthsim_env.parts.scenarios import environment_id, studied_scenarios
+from birthsim_env.parts.scenarios import Scenario, environment_id, studied_scenarios
 from birthsim_env.reward import Tally, add
-from birthsim_env.scores import ROLES, normalized_score, reference_scores
+from birthsim_env.scores import ROLES, is_scored, normalized_score, reference_scores
+from tests.registered import registered
 
 IDS = [environment_id(name) for name in studied_scenarios()]
 PROBE = environment_id("probe")
@@ -59,6 +60,18 @@ def test_every_id_and_condition_has_scores_in_order(environment, sensors, random
     assert normalized_score(environment, ends[1], sensors, randomize) == pytest.approx(100)
     residual = environment.replace("-v", "Residual-v")
     assert reference_scores(residual, sensors, randomize) is known
+
+
+def test_an_environment_that_no_study_measured_says_so(monkeypatch):
+    class Unmeasured(Scenario):
+        title, duration = "A scenario of a test", 1.0
+
+    registered(monkeypatch, Unmeasured, scenario="unmeasured")
+    name = environment_id("unmeasured")
+    assert not is_scored(name)
+    with pytest.raises(ValueError, match=f"environment = '{name}' has no reference scores; allowed: ") as caught:
+        reference_scores(name)
+    assert [one for one in IDS if one not in str(caught.value)] == []
 
 
 @pytest.mark.parametrize(("name", "kept"), [("admittance-backstepping", True), ("backstepping", False)])

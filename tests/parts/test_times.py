@@ -9,7 +9,8 @@ import pytest
 from baselines.identification.experiment import propose, read_plan
 from birthsim_env import ForceProfile, Parameters, Path, StiffnessSchedule
 from birthsim_env.parts.hands.contractions import Contractions
-from birthsim_env.parts.hands.user_forces import Pulls, Ramp
+from birthsim_env.parts.hands.pulls import Pulls
+from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.points import Through
 

@@ -7,8 +7,8 @@ import pytest
 from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import ForceProfile
 from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.hands.pulls import Pulls
 from birthsim_env.parts.hands.steps import AlternatingSteps
-from birthsim_env.parts.hands.user_forces import Pulls
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.scenarios import find_scenario
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.parts.drawn.seeding import Range, draw
-from birthsim_env.parts.hands.user_forces import Pulls
+from birthsim_env.parts.hands.pulls import Pulls
 
 LEAST, USUAL, MOST, BELOW = 5.0, 216.0, 452.0, 0.66
 """N: peak forces of extractions; 66 % of them stay below ``USUAL``.

@@ -2,7 +2,7 @@
 
 import math
 
-from birthsim_env.parts.hands.user_forces import Pulls
+from birthsim_env.parts.hands.pulls import Pulls
 from birthsim_env.parts.references import Path
 from birthsim_env.parts.scenarios import Parts, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule

@@ -2,6 +2,7 @@
 
 import gymnasium
 import numpy as np
+
 from birthsim_env.parts.sensors.encoder import STEP
 
 
