@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from baselines.backstepping.controller import BacksteppingController
     from baselines.bench.evaluation import Evaluation, evaluate
     from baselines.controller import Controller
-    from baselines.registry import make_controller
+    from baselines.named import make_controller
 
 BELONGS_TO_BIRTHSIM = True
 """Tells this package from others of its name: see ``birthsim.shadows``."""

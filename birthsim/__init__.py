@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from baselines.bench.evaluation import evaluate as evaluate
     from baselines.controller import Controller as Controller
     from baselines.identification.identified import Identified as Identified
-    from baselines.registry import make_controller as make_controller
+    from baselines.named import make_controller as make_controller
     from baselines.staged import ControllerStage as ControllerStage
     from baselines.staged import StagedController as StagedController
     from birthsim.environments import environments as environments
@@ -81,7 +81,7 @@ _PLACES = {
     "load_parameters": "birthsim_env.physics.rig.parameters",
     "load_policy": "agents.policy.seeds",
     "make": "birthsim.environments",
-    "make_controller": "baselines.registry",
+    "make_controller": "baselines.named",
     "make_vec": "birthsim.environments",
     "normalized_score": "birthsim_env.scores",
     "policies": "birthsim.names",

@@ -8,7 +8,7 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines.driving import NO_ACTION, driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim.command_line.worlds import policy_of
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters

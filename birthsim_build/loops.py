@@ -7,7 +7,7 @@ from typing import Any, TypeGuard, cast
 import gymnasium
 import numpy as np
 
-from baselines.registry import compiled_names, make_controller
+from baselines.named import compiled_names, make_controller
 from baselines.staged import StagedController
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
 from birthsim_build.stages import enter_scenario, outside, pair_valves

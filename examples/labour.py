@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import ForceProfile, Parameters
 from birthsim_env.parts.own_parts import stepped
 from birthsim_env.parts.points import Through

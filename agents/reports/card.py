@@ -11,7 +11,7 @@ from agents.policy.files import read_policy
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import penalize_lost, quantile
-from baselines.registry import make_controller, uses_force
+from baselines.named import make_controller, uses_force
 from birthsim_env import __version__, reference_scores
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters

@@ -18,7 +18,7 @@ from agents.residual.settings import NO_LAW, ResidualSettings
 from baselines.controller import require_stiffness
 from baselines.driving import CompiledDriving
 from baselines.impedance import Impedance, declared_by
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import ACTION, SHOWN, Seen
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from baselines.registry import resolved, uses_force
+from baselines.named import resolved, uses_force
 from birthsim_env.assembly import one_of
 from birthsim_env.physics.rig.values import is_within, make_plain, shown
 

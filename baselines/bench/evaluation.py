@@ -18,7 +18,7 @@ from baselines.bench.metrics import UNITS, metrics_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import CommandFunction, Controller, controller_of
 from baselines.driving import Driving, driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.tables import aligned, markdown
 from birthsim_env.assembly import Arguments, refuse_unknown, spelled_out
 from birthsim_env.physics.compiled.lanes import Array

@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate, merged
 from baselines.controller import Controller
-from baselines.registry import bare_name, make_controller
+from baselines.named import bare_name, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 

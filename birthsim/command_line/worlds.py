@@ -5,7 +5,7 @@ from typing import Any
 
 import gymnasium
 
-from baselines.registry import known_options, split_options
+from baselines.named import known_options, split_options
 from birthsim_env.physics.rig.values import near
 
 

@@ -39,7 +39,7 @@ def main(settings: Settings) -> None:
         from agents.residual.settings import NO_LAW
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: {installation('agents')}") from error
-    from baselines.registry import make_controller
+    from baselines.named import make_controller
     from birthsim_env.physics.rig.parameters import Parameters
 
     places = policy_folders(settings.policy)

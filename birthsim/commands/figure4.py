@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 import birthsim_env
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.tables import aligned
 from birthsim.command_line.settings import Configured, Controller, RigFile, Sensors, Set
 from birthsim.command_line.worlds import with_options

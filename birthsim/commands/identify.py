@@ -16,7 +16,7 @@ from baselines.identification.laboratory import run_plan
 from baselines.identification.log_columns import LogOptions
 from baselines.identification.log_file import read_trial, write_trial
 from baselines.logs.writing import WRITERS
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Configured, RigFile, Seed, number, whole
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters

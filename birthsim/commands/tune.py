@@ -29,7 +29,7 @@ from baselines.bench.pieces import controller_settings, file_hash
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
-from baselines.registry import make_controller, split_options
+from baselines.named import make_controller, split_options
 from baselines.tables import aligned
 from baselines.work.tasks import Task, result_of
 from birthsim.command_line.settings import CONTROLLER, SENSORS, Parts, RigFile, Seed, Set, named, whole

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tqdm import tqdm
 
 from baselines.driving import NO_ACTION
-from baselines.registry import compiled_names
+from baselines.named import compiled_names
 from birthsim.recorded import driven
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -16,7 +16,7 @@ import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim.command_line.settings import EPISODES, WORLD, Configured, Env, Seed, whole
 from birthsim.command_line.worlds import check_environment, policy_of
 from birthsim.exports import Form

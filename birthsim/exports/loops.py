@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from agents.policy.shipped import loadable_names
 from baselines.controller import RESIDUAL
-from baselines.registry import compiled_names
+from baselines.named import compiled_names
 from baselines.tables import aligned
 from birthsim.command_line.settings import CONTROL, CONTROLLER, ENV, MANY, SENSORS, Configured, RigFile, Seed
 from birthsim.exports import Form

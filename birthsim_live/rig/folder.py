@@ -12,7 +12,7 @@ import numpy as np
 
 from agents.policy.shipped import loadable_names
 from baselines.controller import RESIDUAL
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_build.faces.module import write_module
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.json_reading import read_json

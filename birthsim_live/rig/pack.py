@@ -10,7 +10,7 @@ import numpy as np
 
 import birthsim_env
 from baselines.controller import RESIDUAL, Controller
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.staged import StagedController
 from birthsim_build.faces.module import Store
 from birthsim_build.image import INPUT_MEMORY, Part, function_name

@@ -33,7 +33,7 @@ BYTES = 8 * (1 + ASKED)
 
 def made(name: str, rig: Parameters) -> Controller:
     """The controller ``name``."""
-    from baselines.registry import make_controller  # which takes a third of a second to load
+    from baselines.named import make_controller  # which takes a third of a second to load
 
     return make_controller(name, rig)
 

@@ -1,6 +1,6 @@
 """Every registered controller and policy: what it is, what it needs, and what its name is short for."""
 
-from baselines.registry import compiled_names, resolved, uses_force, with_brackets
+from baselines.named import compiled_names, resolved, uses_force, with_brackets
 from birthsim_env.registry import Entry, entries
 
 

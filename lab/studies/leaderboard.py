@@ -17,7 +17,7 @@ import numpy as np
 
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.controller import RESIDUAL
-from baselines.registry import make_controller, resolved
+from baselines.named import make_controller, resolved
 from birthsim.command_line.settings import Configured
 from birthsim.commands.evaluate import Settings as Evaluated
 from birthsim_env import Parameters, normalized_score, reference_scores

@@ -14,7 +14,7 @@ from typing import Annotated
 import gymnasium
 import numpy as np
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.staged import StagedController
 from birthsim.command_line.settings import MANY, Configured, Sensors, whole
 from birthsim_env import Parameters

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.valve_inverse import CylinderAir, force_first_openings, two_valve_openings
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters

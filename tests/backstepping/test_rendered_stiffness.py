@@ -5,7 +5,7 @@ import pytest
 
 from baselines import BacksteppingController
 from baselines.bench.probes import run_stiffness_test
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import FRICTIONLESS

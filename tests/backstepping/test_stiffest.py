@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from baselines.backstepping.stiffest import stiffest, stiffest_direction
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from lab.studies.haptics.worlds import POSES, no_hand, resting
 from lab.studies.stability.rig_port import RigPort

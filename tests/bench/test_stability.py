@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.bench.pieces import controller_settings
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.stability import maps as stability
 from lab.studies.stability.figure import stability_figure

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from baselines.registry import compiled_names, make_controller
+from baselines.named import compiled_names, make_controller
 from birthsim_build.building import build_c
 from birthsim_build.bundle import Bundle, identifier
 from birthsim_build.code.targets import HOST

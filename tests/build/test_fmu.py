@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim.exports import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names

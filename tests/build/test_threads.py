@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from llvmlite.binding import llvm_version_info
 
-from baselines.registry import compiled_names
+from baselines.named import compiled_names
 from birthsim_build.code import threads
 from birthsim_build.code.compiler import LEAST_LLVM, compile_object
 from birthsim_build.device.export import write_programs

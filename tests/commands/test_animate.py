@@ -10,7 +10,7 @@ from PIL import Image
 
 import birthsim_env
 from baselines.driving import driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim import recorded
 from birthsim.commands import animate
 from birthsim.commands.animate import SAMPLE, take

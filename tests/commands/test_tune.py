@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim.commands import tune
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges

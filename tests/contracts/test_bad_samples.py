@@ -9,7 +9,7 @@ import pytest
 
 from agents.policy.controller import ResidualController
 from baselines.limiter.controller import PortLimiter
-from baselines.registry import compiled_names, make_controller
+from baselines.named import compiled_names, make_controller
 from baselines.staged import StagedController
 from birthsim_env import Parameters, Reference
 from birthsim_env.loop import guard

@@ -10,7 +10,7 @@ import pytest
 
 from agents.residual.settings import NO_LAW
 from baselines.inputs import COMMAND_OPTIONS
-from baselines.registry import LIMITED, known_options, make_controller, resolved, uncontrolled_names
+from baselines.named import LIMITED, known_options, make_controller, resolved, uncontrolled_names
 from birthsim_env import Parameters, Reference
 from birthsim_env.registry import names
 from tests.oracles import closed_loop

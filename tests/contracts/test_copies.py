@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.registry import names
 

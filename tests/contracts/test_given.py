@@ -17,7 +17,7 @@ from agents.policy.seeds import best_policy, policy_folders
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration
 from baselines import evaluate
-from baselines.registry import known_options, make_controller
+from baselines.named import known_options, make_controller
 from birthsim_env import Measurement, Parameters, Reference
 from birthsim_env.parts.hands import contractions, sine, steps, user_forces
 from birthsim_env.parts.sensors.ideal import IdealSensors

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines import evaluate
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.callables import arguments_of
 
@@ -16,7 +16,7 @@ SOURCE = """
 import functools
 import numba
 import numpy as np
-from baselines.registry import make_controller
+from baselines.named import make_controller
 
 def law(seen, asked):
     return np.zeros((4, seen.position.shape[1]))

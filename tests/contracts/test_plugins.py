@@ -8,7 +8,7 @@ import pytest
 
 from agents.policy.shipped import SHIPPED
 from baselines.bench.evaluation import evaluate
-from baselines.registry import compiled_names, known_options, make_controller, uses_force
+from baselines.named import compiled_names, known_options, make_controller, uses_force
 from birthsim_env import Parameters
 from birthsim_env.registry import names, register
 from tests.console import call

@@ -8,7 +8,7 @@ import pytest
 from agents.training.configuration import load_configuration
 from baselines.identification.experiment import NAMES, read_plan
 from baselines.logs.table import read_table
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.own_parts import stiffness_of
 from birthsim_live.logs.reading import read_log

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from baselines.bench.resting import RestingRigs
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.physics.rig.parameters import load_parameters
 from tests.controllers.test_admittance_adaptive import openings

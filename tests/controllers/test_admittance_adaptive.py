@@ -8,7 +8,7 @@ import pytest
 
 from baselines.admittance.rows import Constants, Memory
 from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.comparison.grid import as_described

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.registry import make_controller, resolved, uses_force, with_brackets
+from baselines.named import make_controller, resolved, uses_force, with_brackets
 from birthsim_env import Parameters
 from birthsim_env.registry import entries
 from tests.bench.test_evaluation import Spy, run

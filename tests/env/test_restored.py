@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import birthsim_env
 from baselines.driving import driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.restored import generator_complaint
 from birthsim_env.state import give_state, take_state
 from tests.contracts.test_environments import WORLDS, made

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from agents.residual.env import ResidualEnv
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings
-from baselines.registry import known_options, make_controller
+from baselines.named import known_options, make_controller
 from birthsim_env import Parameters, Plant, StiffnessSchedule, Trajectory, UserForce
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.registry import names

@@ -15,7 +15,7 @@ from baselines.identification.noise import guessed_noise
 from baselines.identification.rows import checked_trial
 from baselines.identification.trial import Trial
 from baselines.identification.windows import cut
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from tests.fuzz.strategies import NUMBERS
 from tests.fuzz.watched import cases, watched

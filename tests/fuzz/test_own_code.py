@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from tests.fuzz.strategies import damaged
 from tests.fuzz.watched import cases, watched

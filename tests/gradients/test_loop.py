@@ -9,7 +9,7 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 from baselines.driving import driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names

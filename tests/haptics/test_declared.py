@@ -6,7 +6,7 @@ import pytest
 from baselines import registry
 from baselines.backstepping.impedance import joint_impedance
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
-from baselines.registry import controlling_names, make_controller, uncontrolled_names
+from baselines.named import controlling_names, make_controller, uncontrolled_names
 from birthsim_env import Parameters, Reference
 from lab.studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
 from lab.studies.haptics.recording import record

@@ -7,7 +7,7 @@ import numpy as np
 from baselines.identification.experiment import propose
 from baselines.identification.laboratory import run_plan
 from baselines.identification.trial import Trial
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 
 OWNER = Parameters()

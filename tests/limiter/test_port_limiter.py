@@ -8,7 +8,7 @@ import pytest
 
 from baselines.driving import CompiledDriving, Driving, driving
 from baselines.limiter.controller import PortLimiter
-from baselines.registry import bare_name, known_options, make_controller
+from baselines.named import bare_name, known_options, make_controller
 from birthsim_env import Measurement, Parameters
 from birthsim_env.loop.rows import Signals, fill_measurement
 from lab.studies.haptics.worlds import resting

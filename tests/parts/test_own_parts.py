@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.registry import known_options, split_options
+from baselines.named import known_options, split_options
 from birthsim.command_line.worlds import with_options
 from birthsim_env import Circle, UserForce
 from birthsim_env.parts.own_parts import Through, trajectory_of

@@ -9,7 +9,7 @@ import pytest
 
 from agents.residual.corrected import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, CorrectedController, stiffen
 from agents.residual.settings import ResidualSettings
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.parts.scenarios import environment_id

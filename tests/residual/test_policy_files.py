@@ -74,7 +74,7 @@ def test_running_a_policy_needs_neither_torch_nor_stable_baselines(folder):
     program = (
         "import sys\n"
         "sys.modules['torch'] = sys.modules['stable_baselines3'] = sys.modules['sb3_contrib'] = None\n"
-        "from baselines.registry import make_controller\n"
+        "from baselines.named import make_controller\n"
         "from birthsim_env import Parameters\n"
         "import gymnasium, sys\n"
         f"law = make_controller('residual', Parameters(), policy={str(folder)!r})\n"

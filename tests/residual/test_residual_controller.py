@@ -7,7 +7,7 @@ import pytest
 from agents.policy.controller import ResidualController
 from agents.policy.files import save_policy
 from agents.residual.settings import ResidualSettings
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from tests.residual.policies import policy
 

@@ -7,7 +7,7 @@ import pytest
 from agents.residual import authority
 from agents.residual.corrected import CorrectedController, ResidualActuation
 from agents.residual.settings import IMPEDANCES, LAWS, needs_force
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE

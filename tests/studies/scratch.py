@@ -6,7 +6,7 @@ TREE = {
         import baselines.patches
         from baselines import tools
         from baselines.middle import through
-        from baselines.registry import make_controller
+        from baselines.named import make_controller
 
         def measure(controller):
             return through(make_controller(controller)), tools.scaled(2.0)
@@ -55,7 +55,7 @@ TREE = {
 
         patch()
         """,
-    "baselines/registry.py": """
+    "baselines/named.py": """
         from birthsim_env.registry import entry
 
         def make_controller(name):

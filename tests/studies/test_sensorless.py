@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.bench.resting import RestingRigs
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from lab.studies.sensorless.privileged import Privileged
 from lab.studies.sensorless.study import RIGS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.impedance import Impedance
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies import shaken
 from lab.studies.haptics.worlds import Condition

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import MASS, parameter_column

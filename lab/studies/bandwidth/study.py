@@ -10,7 +10,7 @@ from baselines.bench.resting import RestingRigs
 from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Complex, declared_by, mass_spring_damper
-from baselines.registry import uses_force
+from baselines.named import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array

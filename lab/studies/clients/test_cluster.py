@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from baselines.bench.evaluation import merged
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.side_by_side import side_by_side
 from baselines.work.tasks import Task, run_tasks
 from birthsim_build.device.evaluation import evaluate_on

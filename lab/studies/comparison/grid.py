@@ -20,7 +20,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import controller_settings, file_hash, file_stem
 from baselines.bench.statistics import penalize_lost
-from baselines.registry import controlling_names, make_controller
+from baselines.named import controlling_names, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.assembly import Arguments
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios

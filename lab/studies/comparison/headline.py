@@ -5,7 +5,7 @@ import numpy as np
 from agents.policy.files import read_policy
 from agents.policy.seeds import policy_folders
 from baselines.bench.statistics import number
-from baselines.registry import resolved, uses_force
+from baselines.named import resolved, uses_force
 from lab.engine.tables import markdown
 from lab.studies.comparison.grid import LEARNED, Conditions
 from lab.studies.comparison.privileged import TOLD

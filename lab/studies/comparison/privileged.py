@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from baselines.bench.evaluation import Evaluation, batches, evaluate, merged
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.staged import StagedController
 from birthsim_env.assembly import Arguments
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters

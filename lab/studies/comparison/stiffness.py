@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from baselines.bench.pieces import file_stem
 from baselines.bench.pneumatic_range import pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import Mask, displacement
 from birthsim_env.physics.compiled.lanes import Array

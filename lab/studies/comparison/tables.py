@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.bench.statistics import number
-from baselines.registry import uses_force
+from baselines.named import uses_force
 from lab.engine.tables import markdown
 from lab.studies.comparison.grid import METRICS, MOVING, RIGS
 

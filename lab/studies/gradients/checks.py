@@ -6,7 +6,7 @@ import numpy as np
 
 from agents.residual.env import ResidualVectorEnv
 from baselines.bench.statistics import quantile
-from baselines.registry import LIMITED
+from baselines.named import LIMITED
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.registry import names, register

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.driving import driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.gradients.recorder import Recorder
 from birthsim_env.loop.rows import STATE
 from birthsim_env.physics.compiled.lanes import Array

@@ -9,7 +9,7 @@ import numpy as np
 from baselines.bench.probes import board_limit
 from baselines.bench.resting import RestingRigs
 from baselines.controller import Controller
-from baselines.registry import LIMITED, make_controller
+from baselines.named import LIMITED, make_controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Reference
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream

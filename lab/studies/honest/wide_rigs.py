@@ -9,7 +9,7 @@ import numpy as np
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable, penalize_lost, quantile
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.assembly import Arguments
 from birthsim_env.parts.drawn.randomization import draw_parameters

@@ -9,7 +9,7 @@ import numpy as np
 from baselines.bench.evaluation import Evaluation, evaluate_worlds
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
-from baselines.registry import make_controller, uses_force
+from baselines.named import make_controller, uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream

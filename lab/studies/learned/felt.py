@@ -6,7 +6,7 @@ import numpy as np
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.statistics import jsonable, penalize_lost, quantile
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.haptics.worlds import Condition

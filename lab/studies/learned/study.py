@@ -12,7 +12,7 @@ from agents.policy.seeds import as_table, policy_folders, seed_metrics
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
 from baselines.bench.statistics import jsonable
-from baselines.registry import uses_force
+from baselines.named import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters

@@ -7,7 +7,7 @@ import numpy as np
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.statistics import number
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.parameters import Parameters

@@ -17,7 +17,7 @@ from agents.training.validation import validate
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, number, quantile
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.files import finite
 from birthsim_env.physics.compiled.lanes import Array

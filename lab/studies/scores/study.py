@@ -11,7 +11,7 @@ from agents.policy.shipped import SHIPPED
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
-from baselines.registry import make_controller, uncontrolled_names
+from baselines.named import make_controller, uncontrolled_names
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names, register

@@ -8,7 +8,7 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.identification.experiment import propose
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.staged import StagedController
 from baselines.work.tasks import Result
 from birthsim_env.physics.rig.parameters import Parameters, value_of

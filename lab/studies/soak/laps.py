@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 import agents
 from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import Array

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import birthsim_env
 from baselines.driving import driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array

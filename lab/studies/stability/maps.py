@@ -14,7 +14,7 @@ import numpy as np
 from baselines.bench.pieces import file_stem
 from baselines.bench.probes import board_limit
 from baselines.controller import Controller
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array

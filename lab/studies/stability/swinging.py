@@ -4,7 +4,7 @@ from typing import cast
 
 import numpy as np
 
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.staged import StagedController
 from baselines.work.tasks import Result
 from birthsim_env.physics.rig.parameters import Parameters

@@ -10,7 +10,7 @@ from baselines.bench.resting import RestingRigs
 from baselines.identification.experiment import propose
 from baselines.identification.identified import MISFIT, identify
 from baselines.identification.laboratory import PNEUMATIC, STIFFNESS, run_plan
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.loop.stage import Part

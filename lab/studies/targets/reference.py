@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 
 from baselines.driving import Driving, driving
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_build.layout import LAYOUT
 from birthsim_env import Measurement, Parameters, Plant, Reference
 from birthsim_env.loop.rows import ASKED, IMPACT, OPENING, SEEN, WORLD

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines.registry import compiled_names
+from baselines.named import compiled_names
 from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle

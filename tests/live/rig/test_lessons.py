@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from baselines import evaluate
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_live.logs.recording import SLICES
 from tests.live.rig.worker import run

@@ -19,7 +19,7 @@ OWN = """
 import time
 
 import numpy as np
-from baselines.registry import make_controller
+from baselines.named import make_controller
 
 class Law:
     def __init__(self, parameters):

@@ -15,7 +15,7 @@ import numpy as np
 
 from agents.policy.files import read_policy
 from agents.policy.seeds import best_policy
-from baselines.registry import controlling_names, make_controller
+from baselines.named import controlling_names, make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.registry import names

@@ -128,7 +128,7 @@ def f(x: int, y=(1, 2)) -> float:
 @pytest.mark.parametrize(
     ("then", "now", "same"),
     [
-        ("What it does.", "What it did, with 'baselines.registry'.", True),
+        ("What it does.", "What it did, with 'baselines.named'.", True),
         ("  # a comment", "", True),
         ("from __future__ import annotations\n", "", True),
         ("x + 1.0", "(\n        x\n        + 1.0\n    )", True),

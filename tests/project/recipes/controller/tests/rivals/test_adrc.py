@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.bench.evaluation import evaluate
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from birthsim_env import Parameters
 
 RIG = Parameters()

@@ -4,7 +4,7 @@ from typing import Any
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.statistics import quantile
-from baselines.registry import make_controller
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import register
