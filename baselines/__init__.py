@@ -21,7 +21,7 @@ _PLACES = {
     "Controller": "controller",
     "Evaluation": "bench.evaluation",
     "evaluate": "bench.evaluation",
-    "make_controller": "registry",
+    "make_controller": "named",
 }
 """Public name -> where it lives; it is imported when it is first used."""
 

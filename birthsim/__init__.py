@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from baselines.named import make_controller as make_controller
     from baselines.staged import ControllerStage as ControllerStage
     from baselines.staged import StagedController as StagedController
-    from birthsim.environments import environments as environments
-    from birthsim.environments import make as make
-    from birthsim.environments import make_vec as make_vec
+    from birthsim.envs import environments as environments
+    from birthsim.envs import make as make
+    from birthsim.envs import make_vec as make_vec
     from birthsim.exporting import export as export
     from birthsim.identification import identify as identify
     from birthsim.names import controllers as controllers
@@ -72,7 +72,7 @@ _PLACES = {
     "UserForce": "birthsim_env.parts.hands.user_forces",
     "balanced_pressures": "birthsim_env.gradients.linear.linearize",
     "controllers": "birthsim.names",
-    "environments": "birthsim.environments",
+    "environments": "birthsim.envs",
     "evaluate": "baselines.bench.evaluation",
     "export": "birthsim.exporting",
     "identify": "birthsim.identification",
@@ -80,9 +80,9 @@ _PLACES = {
     "linearize_lanes": "birthsim_env.gradients.linear.linearize",
     "load_parameters": "birthsim_env.physics.rig.parameters",
     "load_policy": "agents.policy.seeds",
-    "make": "birthsim.environments",
+    "make": "birthsim.envs",
     "make_controller": "baselines.named",
-    "make_vec": "birthsim.environments",
+    "make_vec": "birthsim.envs",
     "normalized_score": "birthsim_env.scores",
     "policies": "birthsim.names",
     "reference_scores": "birthsim_env.scores",

@@ -13,7 +13,8 @@ from multiprocessing import get_context
 import numpy as np
 from numba.core.registry import CPUDispatcher
 
-from birthsim_env.loop.stage import ARGUMENTS, address_of
+from birthsim_env.loop.machine import ARGUMENTS
+from birthsim_env.loop.stage import address_of
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.processors import ROOT
@@ -26,7 +27,7 @@ def stages() -> list[str]:
     found = {}
     for package in PACKAGES:
         for module in pkgutil.walk_packages([str(ROOT / package)], f"{package}."):
-            if any(part in module.name for part in (".commands.", ".figures.", "jax_rollouts")):  # without kernels
+            if any(part in module.name for part in (".figures.", "jax_rollouts")):  # without kernels
                 continue
             for name, value in vars(import_module(module.name)).items():
                 # A helper, which derives from it, is compiled in the kernels that call it.

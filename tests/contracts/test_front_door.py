@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import os
+import pkgutil
 import subprocess
 import sys
 import typing
@@ -75,6 +76,11 @@ def test_a_type_checker_knows_every_name_where_it_is(monkeypatch):
     source = (ROOT / "birthsim" / "__init__.py").read_text(encoding="utf-8")
     exec(compile(source, "birthsim", "exec"), seen | {"__name__": "birthsim"}, seen)
     assert {name: seen[name] for name in NAMES} == {name: getattr(birthsim, name) for name in NAMES}
+
+
+def test_no_name_is_that_of_a_module():
+    """Whoever imports the module would find it under the name from then on."""
+    assert set(NAMES) & {module.name for module in pkgutil.iter_modules(birthsim.__path__)} == set()
 
 
 def test_it_is_imported_at_once():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines import registry
+from baselines import named
 from baselines.backstepping.impedance import joint_impedance
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
 from baselines.named import controlling_names, make_controller, uncontrolled_names
@@ -63,7 +63,7 @@ def test_a_coupled_stiffness_is_felt_along_the_push():
 
 @pytest.mark.parametrize("name", controlling_names())
 def test_who_is_said_to_use_the_force_of_the_hand_does(name):
-    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is registry.uses_force(name)
+    assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is named.uses_force(name)
     assert not uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=False))
 
 
