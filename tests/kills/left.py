@@ -12,8 +12,8 @@ from birthsim_env.partials import HIDDEN
 MADE = {"command", "date", "seconds", "pieces_kept"}
 """Keys of JSON files that say when and how they were made."""
 
-CLOCKS = {"seconds", "cost", "sha256", "environment_fraction", "split"}
-"""Keys of a piece, in a folder below, that say how long it took, or hash what does."""
+CLOCKS = {"seconds", "cost", "sha256", "environment_fraction", "split", "used", "code"}
+"""Keys of a piece, in a folder below, that say how long it took, what its process had used before, or hash what does."""
 
 CHANGING = ("times.json", "checkpoint.safetensors", "events.*", "trials.journal", ".lock")
 """Files that differ from run to run."""
