@@ -7,6 +7,7 @@ import re
 import textwrap
 from importlib import import_module
 
+import birthsim
 from _generate import docstrings
 from _generate.sentences import first_sentence
 
@@ -36,14 +37,18 @@ class _Bare(str):
 
 
 def api(package: str) -> str:
-    """A directive for every public name of a package, in the order of the alphabet."""
+    """A directive for every public name of a package, in alphabetical order; what the front door has too stands there alone."""
     module = import_module(package)
     known = {name: (f"{package}.{name}", getattr(module, name)) for name in module.__all__}
     for dotted in BEYOND[package]:
         place, _, name = dotted.rpartition(".")
         known[name] = (f"{package}.{dotted}", getattr(import_module(f"{package}.{place}"), name))
+    own = dict(known)
+    for name in sorted({*known} & {*birthsim.__all__} if package != "birthsim" else ()):
+        if known[name][1] is getattr(birthsim, name):
+            known[name] = f"birthsim.{name}", own.pop(name)[1]
     words = "\n".join(f"- {{py:obj}}`{known[name][0]}`: {_first(known[name][1])}" for name in sorted(known))
-    return "\n\n".join([inspect.getdoc(module) or "", words, *(_entry(*known[name]) for name in sorted(known))])
+    return "\n\n".join([inspect.getdoc(module) or "", words, *(_entry(*own[name]) for name in sorted(own))])
 
 
 def _entry(dotted: str, thing: object) -> str:

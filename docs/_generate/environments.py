@@ -5,6 +5,7 @@ import re
 
 import gymnasium
 
+import agents  # noqa: F401  registers the ids with a controller inside
 import birthsim_env
 from birthsim_env import observation, reward
 from birthsim_env.assembly import DEFAULTS

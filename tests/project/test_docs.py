@@ -89,10 +89,11 @@ def test_generated_parts_know_everything(parts):
 
 
 def test_pages_of_the_code_spell_out_arguments_and_defaults(parts):
-    pages = " ".join(parts[f"api_{package}.md"] for package in ("birthsim_env", "baselines", "agents"))
-    assert "HAS_DEFAULT_FACTORY" not in pages
-    assert "**arguments" not in pages
-    assert pages.count("sensors: str = 'ideal', randomize: Randomize = False") == 3
+    front, *others = (parts[f"api_{package}.md"] for package in ("birthsim", "birthsim_env", "baselines", "agents"))
+    pages = "".join(others)
+    assert "HAS_DEFAULT_FACTORY" not in front + pages
+    assert "**arguments" not in pages  # make takes those of any environment
+    assert (front + pages).count("sensors: str = 'ideal', randomize: Randomize = False") == 3
 
 
 def test_every_part_has_its_page(parts):
