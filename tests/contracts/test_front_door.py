@@ -12,6 +12,7 @@ import pytest
 
 import birthsim
 from birthsim_env import registry
+from tests.build.targets import need_linker
 from tests.console import ROOT
 
 NAMES = birthsim.__all__
@@ -61,6 +62,8 @@ def registered():
 @pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_runs(name, tmp_path, monkeypatch):
+    if name == "export":
+        need_linker()
     monkeypatch.chdir(tmp_path)
     thing = getattr(birthsim, name)
     (test,) = [one for one in doctest.DocTestFinder(recurse=False).find(thing, name, globs={}) if one.examples]
