@@ -99,3 +99,10 @@ def test_numbers_out_of_a_functions_domain_are_no_errors():
     assert plain._MATH.floor(np.nan) == plain._MATH.floor(np.inf) == plain.NO_NUMBER
     assert plain._MATH.floor(-1.5) == -2
     assert plain._MATH.pi == np.pi
+
+
+def test_a_word_that_says_neither_is_refused():
+    environment = {**os.environ, "BIRTHSIM_DEBUG": "no", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", "import birthsim_env"], env=environment, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "BIRTHSIM_DEBUG = 'no'; allowed: 1" in done.stderr.splitlines()[-1]

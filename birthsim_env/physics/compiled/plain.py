@@ -20,7 +20,11 @@ import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-DEBUG = os.environ.get("BIRTHSIM_DEBUG", "0") not in ("", "0")
+_ASKED = os.environ.get("BIRTHSIM_DEBUG", "")
+if _ASKED not in ("", "0", "1"):
+    raise ValueError(f"BIRTHSIM_DEBUG = {_ASKED!r}; allowed: 1 for plain Python, 0 for machine code")
+
+DEBUG = _ASKED == "1"
 """Whether kernels stay plain Python."""
 
 NO_NUMBER = -(2**63)
