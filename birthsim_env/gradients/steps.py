@@ -1,6 +1,6 @@
 """Runge-Kutta steps differentiated: kernels over lanes that walk a tape of states back, or carry a tangent along.
 
-The tape has the state before every step; going back, the three trial states of a step are computed again, with the same bits.
+The tape has the state before every step; going back, the trial states of a step are computed again, with the same bits.
 What ``dynamics.settle`` sets to zero, below 1e-30, counts as if it went on.
 """
 
@@ -43,7 +43,7 @@ def lay_out(
             dynamics.copy(x, trial, n)
         dynamics.right_hand_side(trial, u, f, p, dx, n)
         dynamics.stage(x, dx, total, trial, n, weight_of(stage, step), ahead_of(stage, step))
-        dynamics.copy(total if stage == 3 else trial, points[k + 1], n)
+        dynamics.copy(total if stage == STAGES - 1 else trial, points[k + 1], n)
 
 
 @helper

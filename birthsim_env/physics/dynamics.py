@@ -13,9 +13,10 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.step import STEP
 
-INTEGRATION_STEP = 0.25e-3
-"""s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
+INTEGRATION_STEP = STEP.seconds
+"""s. The longest step of the Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
 
 
 @helper
@@ -257,7 +258,7 @@ def integrate(
     trial: Array,
     n: int,
 ) -> None:
-    """Integrates ``n`` lanes of a state ``x`` by ``steps`` classical Runge-Kutta steps of ``step`` s under constant inputs.
+    """Integrates ``n`` lanes of a state ``x`` by ``steps`` Runge-Kutta steps of ``step`` s under constant inputs.
 
     ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop; the rest is scratch (18, n).
     """
@@ -273,7 +274,7 @@ def integrate(
 
 @kernel
 def advance(state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array) -> None:
-    """Integrates ``state`` in place by classical Runge-Kutta.
+    """Integrates ``state`` in place by Runge-Kutta.
 
     ``forces`` (K, 2, N): each of the K samples is held for ``steps`` steps of ``step`` seconds. ``impacts`` (2, N) gets
     the largest speed at which each piston ran into an end stop.

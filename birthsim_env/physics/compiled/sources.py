@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
+from birthsim_env.physics.step import DEFAULT, METHOD
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "lab")
@@ -78,8 +79,10 @@ def dependencies(paths: Iterable[Path]) -> list[Path]:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not."""
-    digest = hashlib.sha256()
+    """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not.
+
+    Another step of integration than the default has another hash."""
+    digest = hashlib.sha256(b"" if METHOD == DEFAULT else METHOD.encode())
     for file in dependencies([path]):
         # A user's own kernel may lie anywhere.
         place = str(file.relative_to(ROOT) if file.is_relative_to(ROOT) else file)
