@@ -34,7 +34,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
             pieces[(method, step), "courses", law] = Task(f"courses/{law}-{method}-{1e6 * step:.0f}", courses, settings)
     for name in options.controller:
         for member, own in settings_of(name, Parameters()).items():
-            for method in STEPS:
+            for method in (DEFAULT, *options.beside):
                 settings = {
                     "method": method, "settings": own, "environments": list(options.env), "sensors": list(options.sensors),
                     "episodes": options.episodes, "seed": options.seed,
@@ -47,7 +47,7 @@ def _kept(options: Options, found: Found) -> Any:
     members = dict.fromkeys(member for _, kind, member in found if kind == "loops")
     return {
         "courses": {law: courses_of(law, found) for law in LAWS},
-        "loops": [row for member in members for row in loops_of(member, found)],
+        "loops": [row for member in members for row in loops_of(member, options.beside, found)],
     }
 
 
@@ -68,29 +68,28 @@ def _course(result: Result) -> Course:
     return Course(np.array(result["position"]), np.array(result["pressure"]), np.array(result["clear"]))
 
 
-def loops_of(member: str, found: Found) -> list[dict[str, Any]]:
+def loops_of(member: str, beside: Sequence[str], found: Found) -> list[dict[str, Any]]:
     """A row per place and metric: mean and scatter over worlds with the default step, and of the others' paired differences."""
     rows = []
     for place, usual in found[DEFAULT, "loops", member].items():
         environment, sensors = place.split()
         for metric, values in usual["metrics"].items():
             plain = _numbers(values)
-            for method in STEPS:
-                if method != DEFAULT:
-                    other = found[method, "loops", member][place]
-                    both = ~(np.isnan(plain) | np.isnan(_numbers(other["metrics"][metric])))
-                    both &= ~(np.array(usual["lost"]) | np.array(other["lost"]))
-                    if both.sum() > 1:
-                        apart = (_numbers(other["metrics"][metric]) - plain)[both]
-                        rows.append(
-                            {
-                                "controller": member, "environment": environment, "sensors": sensors, "metric": metric,
-                                "step": method, "worlds": int(both.sum()),
-                                "lost": [sum(usual["lost"]), sum(other["lost"])],
-                                "mean": _digits(plain[both].mean()), "scatter": _digits(plain[both].std(ddof=1)),
-                                "difference": _digits(apart.mean()), "spread": _digits(apart.std(ddof=1)),
-                            }
-                        )  # fmt: skip
+            for method in beside:
+                other = found[method, "loops", member][place]
+                both = ~(np.isnan(plain) | np.isnan(_numbers(other["metrics"][metric])))
+                both &= ~(np.array(usual["lost"]) | np.array(other["lost"]))
+                if both.sum() > 1:
+                    apart = (_numbers(other["metrics"][metric]) - plain)[both]
+                    rows.append(
+                        {
+                            "controller": member, "environment": environment, "sensors": sensors, "metric": metric,
+                            "step": method, "worlds": int(both.sum()),
+                            "lost": [sum(usual["lost"]), sum(other["lost"])],
+                            "mean": _digits(plain[both].mean()), "scatter": _digits(plain[both].std(ddof=1)),
+                            "difference": _digits(apart.mean()), "spread": _digits(apart.std(ddof=1)),
+                        }
+                    )  # fmt: skip
     return rows
 
 
@@ -108,13 +107,14 @@ def _shown(content: Content) -> dict[str, str]:
 
 STUDY = Study(
     {
-        "controller": tuple(controlling_names()), "env": ENVIRONMENTS, "sensors": COMPARED, "rigs": 8, "episodes": 16,
-        "seed": SEED,
+        "beside": ("rk3", "fine"), "controller": tuple(controlling_names()), "env": ENVIRONMENTS, "sensors": COMPARED,
+        "rigs": 8, "episodes": 16, "seed": SEED,
     },
     _tasks,
     _kept,
     {"position_m": "m", "pressure_relative": "", "step_s": "s"},
     _shown,
-    words={"rigs": "random corners, and as many random rigs"},
+    allowed={"beside": [method for method in STEPS if method != DEFAULT]},
+    words={"rigs": "random corners, and as many random rigs", "beside": "steps that controllers are measured with besides"},
 )  # fmt: skip
 register(study="step", about="the plant's step of integration beside others, alone and under every controller")(STUDY)

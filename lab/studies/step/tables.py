@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.physics.step import DEFAULT, STEPS
 from lab.engine.tables import markdown
 from lab.studies.accuracy.tables import number
 
@@ -41,10 +40,11 @@ def by_law(courses: dict[str, Any]) -> str:
 
 def by_controller(loops: list[Row]) -> str:
     """A row per controller: how far metrics are from those of the default step, all scenarios and sensor models together."""
-    others = [method for method in STEPS if method != DEFAULT]
+    others = list(dict.fromkeys(row["step"] for row in loops))
     head = ["controller", "metrics"]
     for method in others:
         head += [f"{method}: beyond scatter", "beyond twice the standard error", "largest difference / scatter"]
+        head += ["median", "lost worlds"]
     names = dict.fromkeys(row["controller"] for row in loops)
     rows = [[name, *_counted([row for row in loops if row["controller"] == name], others)] for name in names]
     return markdown([head, *rows, ["all", *_counted(loops, others)]])
@@ -56,7 +56,9 @@ def _counted(rows: list[Row], others: Iterable[str]) -> list[str]:
         own = [row for row in rows if row["step"] == method]
         ratio = np.array([relative(row) for row in own])
         biased = sum(is_biased(row) for row in own)
-        shown += [str(int((ratio > 1).sum())), str(biased), f"{ratio.max():.2g}"]
+        lost = {(row["controller"], row["environment"], row["sensors"]): row["lost"] for row in own}
+        shown += [str(int((ratio > 1).sum())), str(biased), f"{ratio.max():.2g}", f"{np.median(ratio):.1g}"]
+        shown += [" and ".join(str(sum(pair[k] for pair in lost.values())) for k in range(2))]
     return shown
 
 
