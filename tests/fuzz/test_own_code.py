@@ -1,11 +1,10 @@
 """Python files with a controller of a user's own, whole and damaged: whatever they raise is one line."""
 
 from hypothesis import given
-from hypothesis import strategies as st
 
 from baselines.named import make_controller
 from birthsim_env import Parameters
-from tests.fuzz.strategies import damaged
+from tests.fuzz.strategies import damaged, sampled
 from tests.fuzz.watched import cases, watched
 
 CLASS = "class Own:\n    def __init__(self, rig): "
@@ -24,7 +23,7 @@ SOURCES = (
         f"{CLASS}raise ValueError('a\\nb' * 2000)\n",
     ),
 )
-TEXTS = st.sampled_from([text.encode() for text in SOURCES])
+TEXTS = sampled([text.encode() for text in SOURCES])
 
 
 @cases
