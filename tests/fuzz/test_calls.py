@@ -190,7 +190,7 @@ def test_a_part_or_settings(name, data):
     used(name)
     options = options_of(MADE[name])
     how = required(MADE[name]) | data.draw(odd_options(options))
-    with watched(*how, *options, "setpoint", "knots", runs_code=True, memory=CALLING):
+    with watched(*how, *options, "reference", "setpoint", "knots", runs_code=True, memory=CALLING):
         use(MADE[name](**how))
 
 

@@ -15,7 +15,7 @@ SOURCES = (
     *("raise RuntimeError('at import')\n", "raise SystemExit(3)\n", "import sys\nsys.exit()\n", "raise KeyError\n"),
     *("raise ValueError('a\\nb')\n", "raise GeneratorExit\n", "raise MemoryError\n", "def f(): f()\nf()\n", "x = 1 / 0\n"),
     *("x = " + "(" * 500 + ")" * 500, "x = " + "9" * 5000 + "\n", "# coding: latin-99\nOwn = 1\n"),
-    *("class Own: pass\n", "Own = 3\n", "Own = None\n", "def Own(*a): return None\n"),
+    *("class Own: pass\n", "class Own(Exception): pass\n", "Own = 3\n", "Own = None\n", "def Own(*a): return None\n"),
     "class Own(Exception): pass\nraise Own('ö' * 5000)\n",
     *(
         f"{CLASS}raise SystemExit(1)\n",
