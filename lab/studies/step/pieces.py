@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,6 +17,10 @@ from birthsim_env.physics.step import METHOD
 from lab.studies.accuracy.errors import rigs_to_measure, run_method, runge_kutta
 from lab.studies.accuracy.motions import MOTIONS
 from lab.studies.comparison.grid import run_cell
+from lab.studies.gradients.states import plant_of
+
+LANES, RUNS = (1, 64, 256), 200
+"""Lanes of which the kernel's time is taken, and runs of which the least counts."""
 
 
 def courses(method: str, step: float, law: str, rigs: int, seed: int) -> Result:
@@ -28,6 +33,23 @@ def courses(method: str, step: float, law: str, rigs: int, seed: int) -> Result:
         name: {"position": one.position.tolist(), "pressure": one.pressure.tolist(), "clear": one.clear.tolist()}
         for name, one in found.items()
     }
+
+
+def seconds(method: str, turn: int) -> Result:
+    """CPU time of the plant's kernel a policy step of 10 ms and lane, s, by number of lanes; ``turn`` counts repetitions."""
+    if method != METHOD:
+        return _elsewhere(method, "seconds", {"turn": turn})
+    found = {}
+    for lanes in LANES:
+        plant, command, force = plant_of(lanes, turn)
+        state, best = plant.state.copy(), np.inf
+        for _ in range(RUNS):
+            plant.state[:] = state
+            began = time.thread_time()
+            plant.advance_unchecked(command, force[None], 0.01)
+            best = min(best, time.thread_time() - began)
+        found[str(lanes)] = best / lanes
+    return found
 
 
 def closed_loops(

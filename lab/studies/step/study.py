@@ -17,13 +17,15 @@ from lab.engine.study import Found, Options, Study
 from lab.engine.worlds import SEED
 from lab.studies.accuracy.errors import LAWS, Course, errors
 from lab.studies.comparison.grid import COMPARED, ENVIRONMENTS, settings_of
-from lab.studies.step.pieces import closed_loops, courses
+from lab.studies.step.pieces import closed_loops, courses, seconds
 from lab.studies.step.tables import tables
 
 MEASURED = (("rk4", 0.25e-3), ("rk3", 0.25e-3), ("rk3", STEPS["rk3"].seconds))
 """Methods and steps, s, whose error is measured, with the limits of the method's own step."""
 EXACT = ("rk4", 1e-3 / 64)
 """What they are measured against."""
+TURNS = 5
+"""How often the kernel's time is taken of each step, in turns."""
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -32,6 +34,9 @@ def _tasks(options: Options) -> dict[Any, Task]:
         for law in LAWS:
             settings = {"method": method, "step": step, "law": law, "rigs": options.rigs, "seed": 0}
             pieces[(method, step), "courses", law] = Task(f"courses/{law}-{method}-{1e6 * step:.0f}", courses, settings)
+    for turn in range(TURNS):
+        for method in (DEFAULT, *options.beside):
+            pieces[method, "seconds", turn] = Task(f"seconds/{method}-{turn}", seconds, {"method": method, "turn": turn})
     for name in options.controller:
         for member, own in settings_of(name, Parameters()).items():
             for method in (DEFAULT, *options.beside):
@@ -47,6 +52,12 @@ def _kept(options: Options, found: Found) -> Any:
     members = dict.fromkeys(member for _, kind, member in found if kind == "loops")
     return {
         "courses": {law: courses_of(law, found) for law in LAWS},
+        "seconds": {
+            method: {
+                lanes: [found[method, "seconds", turn][lanes] for turn in range(TURNS)] for lanes in found[method, "seconds", 0]
+            }
+            for method in (DEFAULT, *options.beside)
+        },
         "loops": [row for member in members for row in loops_of(member, options.beside, found)],
     }
 
@@ -112,7 +123,7 @@ STUDY = Study(
     },
     _tasks,
     _kept,
-    {"position_m": "m", "pressure_relative": "", "step_s": "s"},
+    {"position_m": "m", "pressure_relative": "", "step_s": "s", "seconds": "s"},
     _shown,
     allowed={"beside": [method for method in STEPS if method != DEFAULT]},
     words={"rigs": "random corners, and as many random rigs", "beside": "steps that controllers are measured with besides"},

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from birthsim_env.physics.step import DEFAULT
 from lab.engine.tables import markdown
 from lab.studies.accuracy.tables import number
 
@@ -13,7 +14,21 @@ Row = dict[str, Any]
 
 def tables(found: dict[str, Any]) -> str:
     """Errors of the motion by friction law, and differences in closed loop by controller."""
-    return "\n\n".join([by_law(found["courses"]), by_controller(found["loops"])])
+    return "\n\n".join([by_law(found["courses"]), by_lanes(found["seconds"]), by_controller(found["loops"])])
+
+
+def by_lanes(seconds: dict[str, dict[str, list[float]]]) -> str:
+    """CPU time of the kernel a policy step and lane, a row per step: the least of all turns, and over the default's."""
+    usual = seconds[DEFAULT]
+    rows = [["step"]]
+    for lanes in usual:
+        rows[0] += [f"{lanes} lanes: us", f"of {DEFAULT}"]
+    for method, own in seconds.items():
+        least = {lanes: min(turns) for lanes, turns in own.items()}
+        rows.append([method])
+        for lanes, turns in usual.items():
+            rows[-1] += [f"{1e6 * least[lanes]:.3g}", f"{least[lanes] / min(turns):.2f}"]
+    return markdown(rows)
 
 
 def by_law(courses: dict[str, Any]) -> str:
