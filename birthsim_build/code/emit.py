@@ -23,7 +23,7 @@ from birthsim_build.code.targets import TARGETS, Target
 from birthsim_build.code.threads import BACK, Threads, threads_code
 from birthsim_env.gradients.source import module_of
 from birthsim_env.loop.stage import compiled
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 
 EXPORTED = "birthsim_"
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from birthsim_env.loop.rows import SEEN, TIME, WORLD
 from birthsim_env.loop.stage import Part, Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.dynamics import load, store

@@ -10,13 +10,11 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.loop.stage import ARGUMENTS
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 
 __all__ = ["call", "carray", "pointer", "scratch"]
-
-ARGUMENTS = 7
-"""Of a stage."""
 
 if TYPE_CHECKING:
 

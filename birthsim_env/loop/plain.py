@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows
 

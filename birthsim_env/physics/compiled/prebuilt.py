@@ -1,0 +1,163 @@
+"""Machine code that comes with the package: a library for each target, and an index by a kernel's name and arguments.
+
+It serves while a kernel's sources are those that it was built from. Else, and for other arguments, Numba compiles, a kernel
+at a time. ``BIRTHSIM_PREBUILT=0`` switches it off. The folder ``birthsim_env/prebuilt`` has
+
+    <target>.so, .dylib, .dll    x86-64-v3, aarch64
+    index.json                   {"format": FORMAT, "libraries": {file: SHA-256}, "kernels": {key: [number, stamp, result]}}
+    sources.json                 {``sources.place_of`` a file: ``sources.Source``}, of all files that kernels are made of
+
+A key is ``module.qualname`` and the kinds of the arguments with spaces between; the stamp is ``sources.stamp_of`` the function.
+Kinds of numbers: i (int64), d (float64), b (bool), u (uint64); a result may also be n (none). An array is its ``dtype.char``,
+its number of axes, C, F or A for its order, and r where it is not writeable: ``d2C``. An array by name (``Named``) stands
+behind its layout, ``module.qualname:d2C``, where F is A. A stage's blocks are i, their addresses.
+
+Kernel ``number`` is the symbol ``birthsim_<number>``. Where all arguments and the result are i, it takes and returns int64:
+whoever calls by address, as a loop its stages, needs nothing else. Any other is
+
+    int32 birthsim_<number>(void *result, ...)    0, or what Numba's code returns for an exception
+
+with int64, double, bool as uint8 and uint64 for numbers, and for an array the address of the public fields of NumPy's object
+(``data``, ``nd``, ``dimensions``, ``strides``), so that Python need not take it apart.
+"""
+
+import ctypes
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.kept import PACKAGE
+from birthsim_env.physics.compiled.named import Named
+from birthsim_env.physics.compiled.sources import stamp_of
+from birthsim_env.physics.compiled.switches import switched
+
+if TYPE_CHECKING:
+    from birthsim_env.physics.compiled.compilation import Kernel
+
+FORMAT = 1
+"""Of the folder. A library of another one is not read."""
+
+USED = switched("BIRTHSIM_PREBUILT", True, "prebuilt machine code where there is some", "what Numba compiles")
+"""Whether prebuilt code is looked for."""
+
+LANES = 32
+"""In a block of prebuilt code."""
+
+FOLDER = PACKAGE / "prebuilt"
+ENDINGS = {"linux": "so", "darwin": "dylib", "win32": "dll"}
+_MACHINES = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3", "aarch64": "aarch64", "arm64": "aarch64"}
+
+_NUMBERS = {int: "i", np.int64: "i", float: "d", np.float64: "d", bool: "b", np.bool_: "b", np.uint64: "u"}
+_PASSED = {"i": ctypes.c_int64, "d": ctypes.c_double, "b": ctypes.c_bool, "u": ctypes.c_uint64}
+_HEAD = object.__basicsize__
+"""Bytes of a Python object before its own fields, which in an array are NumPy's."""
+
+_C, _F, _ALIGNED, _WRITEABLE = 0x1, 0x2, 0x100, 0x400
+"""Of the flags of an array."""
+
+
+def target() -> str:
+    """The library's file for this machine, whether or not it is there; empty where none can be."""
+    machine = _MACHINES.get(platform.machine(), "")
+    if machine == "x86-64-v3":
+        found = (np._core if hasattr(np, "_core") else np.core)._multiarray_umath.__cpu_features__
+        machine = machine if all(found.get(one) for one in ("AVX2", "FMA3", "F16C")) else ""
+    return f"{machine}.{ENDINGS[sys.platform]}" if machine and sys.platform in ENDINGS else ""
+
+
+@cache
+def _opened() -> tuple[Any, dict[str, list[Any]]]:
+    """The library for this machine and its kernels; nothing where it is missing, damaged, another's, or switched off."""
+    nothing = None, dict[str, list[Any]]()
+    if not USED or BLOCK != LANES or not _arrays_are_as_known():
+        return nothing
+    try:
+        index, file = json.loads((FOLDER / "index.json").read_bytes()), target()
+        if index["format"] != FORMAT or hashlib.sha256((FOLDER / file).read_bytes()).hexdigest() != index["libraries"][file]:
+            return nothing
+        return ctypes.CDLL(str(FOLDER / file)), index["kernels"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return nothing
+
+
+def _arrays_are_as_known() -> bool:
+    """Whether an array's fields stand where prebuilt code reads them."""
+    array = np.zeros((2, 3))[:, 1:]
+    data, axes, shape, strides = (ctypes.c_int64 * 4).from_address(id(array) + _HEAD)
+    if axes & 0xFFFFFFFF != 2 or data != array.ctypes.data:
+        return False
+    return (ctypes.c_int64 * 2).from_address(shape)[:] == [2, 2] and (ctypes.c_int64 * 2).from_address(strides)[:] == [24, 8]
+
+
+def kind_of(value: Any) -> Any:
+    """The kind of an argument, quickly; ``_code`` names it."""
+    if type(value) is np.ndarray:
+        return value.dtype, value.ndim, value.flags.num
+    return (type(value), kind_of(value.rows)) if isinstance(value, Named) else type(value)
+
+
+def _code(kind: Any) -> str:
+    if not isinstance(kind, tuple):
+        return _NUMBERS.get(kind, "?")
+    if len(kind) == 2:
+        return f"{kind[0].__module__}.{kind[0].__qualname__}:{_code(kind[1]).replace('F', 'A')}"
+    dtype, axes, flags = kind
+    order = "C" if flags & _C else "F" if flags & _F else "A"
+    known = dtype.isnative and flags & _ALIGNED
+    return f"{dtype.char}{axes}{order}{'' if flags & _WRITEABLE else 'r'}" if known else "?"
+
+
+def _found(kernel: "Kernel", codes: list[str]) -> tuple[Any, str]:
+    """The prebuilt code of a kernel for arguments of these kinds, and the kind of its result; None where there is none."""
+    library, kernels = _opened()
+    function = kernel.py_func
+    number, stamp, result = kernels.get(f"{function.__module__}.{function.__qualname__} {' '.join(codes)}", (0, "", ""))
+    return (library[f"birthsim_{number}"], result) if stamp and stamp == stamp_of(function) else (None, "")
+
+
+def of_numbers(kernel: "Kernel", count: int) -> Any:
+    """The prebuilt code of a kernel of ``count`` whole numbers that returns one; None where there is none."""
+    native, _ = _found(kernel, ["i"] * count)
+    if native is not None:
+        native.argtypes, native.restype = [ctypes.c_int64] * count, ctypes.c_int64
+    return native
+
+
+def address(kernel: "Kernel", count: int) -> int:
+    """Where that code begins, or 0."""
+    native = of_numbers(kernel, count)
+    return 0 if native is None else int(ctypes.cast(native, ctypes.c_void_p).value or 0)
+
+
+def _passed(value: Any) -> Any:
+    array = value.rows if isinstance(value, Named) else value
+    return id(array) + _HEAD if type(array) is np.ndarray else array
+
+
+def function(kernel: "Kernel", kinds: tuple[Any, ...]) -> Callable[..., Any] | None:
+    """What calls the prebuilt code of a kernel for arguments of these kinds; None where there is none."""
+    codes = [_code(kind) for kind in kinds]
+    native, result = _found(kernel, codes)
+    if native is None:
+        return None
+    if {*codes, result} == {"i"}:
+        return of_numbers(kernel, len(codes))  # type: ignore[no-any-return]
+    native.argtypes = [ctypes.c_void_p, *(_PASSED.get(code, ctypes.c_int64) for code in codes)]
+    native.restype = ctypes.c_int32
+    returned: Any = _PASSED.get(result, ctypes.c_int64)
+
+    def call(*arguments: Any) -> Any:
+        given = map(_passed, arguments)
+        value = returned()
+        if native(ctypes.byref(value), *given):
+            return kernel.numba(*arguments)  # which raises what prebuilt code cannot
+        return None if result == "n" else value.value
+
+    return call
