@@ -4,7 +4,7 @@ It serves while a kernel's sources are those that it was built from. Else, and f
 at a time. ``BIRTHSIM_PREBUILT=0`` switches it off. The folder ``birthsim_env/prebuilt`` has
 
     <target>.so, .dylib, .dll    x86-64-v3, aarch64
-    index.json                   {"format": FORMAT, "libraries": {file: SHA-256}, "kernels": {key: [number, stamp, result]}}
+    index.json                   {"format": FORMAT, "libraries": {file: SHA-256}, "kernels": {key: [stamp, result]}}
     sources.json                 {``sources.place_of`` a file: ``sources.Source``}, of all files that kernels are made of
 
 A key is ``module.qualname`` and the kinds of the arguments with spaces between; the stamp is ``sources.stamp_of`` the function.
@@ -12,10 +12,10 @@ Kinds of numbers: i (int64), d (float64), b (bool), u (uint64); a result may als
 its number of axes, C, F or A for its order, and r where it is not writeable: ``d2C``. An array by name (``Named``) stands
 behind its layout, ``module.qualname:d2C``, where F is A. A stage's blocks are i, their addresses.
 
-Kernel ``number`` is the symbol ``birthsim_<number>``. Where all arguments and the result are i, it takes and returns int64:
-whoever calls by address, as a loop its stages, needs nothing else. Any other is
+A kernel's symbol is ``symbol_of`` its key. Where all arguments and the result are i, it takes and returns int64: whoever calls
+by address, as a loop its stages, needs nothing else. Any other is
 
-    int32 birthsim_<number>(void *result, ...)    0, or what Numba's code returns for an exception
+    int32 symbol(void *result, ...)    0, or what Numba's code returns for an exception
 
 with int64, double, bool as uint8 and uint64 for numbers, and for an array the address of the public fields of NumPy's object
 (``data``, ``nd``, ``dimensions``, ``strides``), so that Python need not take it apart.
@@ -26,7 +26,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -114,17 +114,28 @@ def _code(kind: Any) -> str:
     return f"{dtype.char}{axes}{order}{'' if flags & _WRITEABLE else 'r'}" if known else "?"
 
 
-def _found(kernel: "Kernel", codes: list[str]) -> tuple[Any, str]:
+def key_of(kernel: "Kernel", kinds: Iterable[str]) -> str:
+    """What the index calls a kernel for arguments of these kinds."""
+    function = kernel.py_func
+    return " ".join((f"{function.__module__}.{function.__qualname__}", *kinds))
+
+
+def symbol_of(key: str) -> str:
+    """What a library calls it: the same whatever other kernels there are."""
+    return f"birthsim_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+
+
+def found(kernel: "Kernel", kinds: Sequence[str]) -> tuple[Any, str]:
     """The prebuilt code of a kernel for arguments of these kinds, and the kind of its result; None where there is none."""
     library, kernels = _opened()
-    function = kernel.py_func
-    number, stamp, result = kernels.get(f"{function.__module__}.{function.__qualname__} {' '.join(codes)}", (0, "", ""))
-    return (library[f"birthsim_{number}"], result) if stamp and stamp == stamp_of(function) else (None, "")
+    key = key_of(kernel, kinds)
+    stamp, result = kernels.get(key, ("", ""))
+    return (library[symbol_of(key)], result) if stamp and stamp == stamp_of(kernel.py_func) else (None, "")
 
 
 def of_numbers(kernel: "Kernel", count: int) -> Any:
     """The prebuilt code of a kernel of ``count`` whole numbers that returns one; None where there is none."""
-    native, _ = _found(kernel, ["i"] * count)
+    native, _ = found(kernel, ["i"] * count)
     if native is not None:
         native.argtypes, native.restype = [ctypes.c_int64] * count, ctypes.c_int64
     return native
@@ -144,7 +155,7 @@ def _passed(value: Any) -> Any:
 def function(kernel: "Kernel", kinds: tuple[Any, ...]) -> Callable[..., Any] | None:
     """What calls the prebuilt code of a kernel for arguments of these kinds; None where there is none."""
     codes = [_code(kind) for kind in kinds]
-    native, result = _found(kernel, codes)
+    native, result = found(kernel, codes)
     if native is None:
         return None
     if {*codes, result} == {"i"}:
