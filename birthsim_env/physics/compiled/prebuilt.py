@@ -4,7 +4,7 @@ It serves while a kernel's sources are those that it was built from. Else, and f
 at a time. ``BIRTHSIM_PREBUILT=0`` switches it off. The folder ``birthsim_env/prebuilt`` has
 
     <target>.so, .dylib, .dll    x86-64-v3, aarch64
-    index.json                   {"format": FORMAT, "libraries": {file: SHA-256}, "kernels": {key: [number, stamp, result]}}
+    index.json                   {"format": FORMAT, "libraries": {file: SHA-256}, "kernels": {key: [stamp, result]}}
     sources.json                 {``sources.place_of`` a file: ``sources.Source``}, of all files that kernels are made of
 
 A key is ``module.qualname`` and the kinds of the arguments with spaces between; the stamp is ``sources.stamp_of`` the function.
@@ -12,10 +12,10 @@ Kinds of numbers: i (int64), d (float64), b (bool), u (uint64); a result may als
 its number of axes, C, F or A for its order, and r where it is not writeable: ``d2C``. An array by name (``Named``) stands
 behind its layout, ``module.qualname:d2C``, where F is A. A stage's blocks are i, their addresses.
 
-Kernel ``number`` is the symbol ``birthsim_<number>``. Where all arguments and the result are i, it takes and returns int64:
-whoever calls by address, as a loop its stages, needs nothing else. Any other is
+A kernel's symbol is ``symbol_of`` its key. Where all arguments and the result are i, it takes and returns int64: whoever calls
+by address, as a loop its stages, needs nothing else. Any other is
 
-    int32 birthsim_<number>(void *result, ...)    0, or what Numba's code returns for an exception
+    int32 symbol(void *result, ...)    0, or what Numba's code returns for an exception
 
 with int64, double, bool as uint8 and uint64 for numbers, and for an array the address of the public fields of NumPy's object
 (``data``, ``nd``, ``dimensions``, ``strides``), so that Python need not take it apart.
@@ -26,7 +26,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -97,34 +97,47 @@ def _arrays_are_as_known() -> bool:
 
 
 def kind_of(value: Any) -> Any:
-    """The kind of an argument, quickly; ``_code`` names it."""
+    """The kind of an argument, quickly; ``code_of`` names it."""
     if type(value) is np.ndarray:
         return value.dtype, value.ndim, value.flags.num
-    return (type(value), kind_of(value.rows)) if isinstance(value, Named) else type(value)
+    kind = type(value)
+    return (kind, kind_of(value.rows)) if kind not in _NUMBERS and isinstance(value, Named) else kind
 
 
-def _code(kind: Any) -> str:
+def code_of(kind: Any) -> str:
+    """What a key has for a kind of arguments; ? where no prebuilt code takes one."""
     if not isinstance(kind, tuple):
         return _NUMBERS.get(kind, "?")
     if len(kind) == 2:
-        return f"{kind[0].__module__}.{kind[0].__qualname__}:{_code(kind[1]).replace('F', 'A')}"
+        return f"{kind[0].__module__}.{kind[0].__qualname__}:{code_of(kind[1]).replace('F', 'A')}"
     dtype, axes, flags = kind
     order = "C" if flags & _C else "F" if flags & _F else "A"
     known = dtype.isnative and flags & _ALIGNED
     return f"{dtype.char}{axes}{order}{'' if flags & _WRITEABLE else 'r'}" if known else "?"
 
 
-def _found(kernel: "Kernel", codes: list[str]) -> tuple[Any, str]:
+def key_of(kernel: "Kernel", kinds: Iterable[str]) -> str:
+    """What the index calls a kernel for arguments of these kinds."""
+    function = kernel.py_func
+    return " ".join((f"{function.__module__}.{function.__qualname__}", *kinds))
+
+
+def symbol_of(key: str) -> str:
+    """What a library calls it: the same whatever other kernels there are."""
+    return f"birthsim_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+
+
+def found(kernel: "Kernel", kinds: Sequence[str]) -> tuple[Any, str]:
     """The prebuilt code of a kernel for arguments of these kinds, and the kind of its result; None where there is none."""
     library, kernels = _opened()
-    function = kernel.py_func
-    number, stamp, result = kernels.get(f"{function.__module__}.{function.__qualname__} {' '.join(codes)}", (0, "", ""))
-    return (library[f"birthsim_{number}"], result) if stamp and stamp == stamp_of(function) else (None, "")
+    key = key_of(kernel, kinds)
+    stamp, result = kernels.get(key, ("", ""))
+    return (library[symbol_of(key)], result) if stamp and stamp == stamp_of(kernel.py_func) else (None, "")
 
 
 def of_numbers(kernel: "Kernel", count: int) -> Any:
     """The prebuilt code of a kernel of ``count`` whole numbers that returns one; None where there is none."""
-    native, _ = _found(kernel, ["i"] * count)
+    native, _ = found(kernel, ["i"] * count)
     if native is not None:
         native.argtypes, native.restype = [ctypes.c_int64] * count, ctypes.c_int64
     return native
@@ -136,28 +149,30 @@ def address(kernel: "Kernel", count: int) -> int:
     return 0 if native is None else int(ctypes.cast(native, ctypes.c_void_p).value or 0)
 
 
-def _passed(value: Any) -> Any:
-    array = value.rows if isinstance(value, Named) else value
-    return id(array) + _HEAD if type(array) is np.ndarray else array
-
-
 def function(kernel: "Kernel", kinds: tuple[Any, ...]) -> Callable[..., Any] | None:
     """What calls the prebuilt code of a kernel for arguments of these kinds; None where there is none."""
-    codes = [_code(kind) for kind in kinds]
-    native, result = _found(kernel, codes)
+    codes = [code_of(kind) for kind in kinds]
+    native, result = found(kernel, codes)
     if native is None:
         return None
     if {*codes, result} == {"i"}:
         return of_numbers(kernel, len(codes))  # type: ignore[no-any-return]
     native.argtypes = [ctypes.c_void_p, *(_PASSED.get(code, ctypes.c_int64) for code in codes)]
     native.restype = ctypes.c_int32
-    returned: Any = _PASSED.get(result, ctypes.c_int64)
+    # A loop over arguments would take as long as the call.
+    names = [f"a{k}" for k in range(len(codes))]
+    ways = {True: "{}", False: f"id({{}}) + {_HEAD}"}
+    given = [ways[code in _PASSED].format(name + ".rows" * (":" in code)) for name, code in zip(names, codes, strict=True)]
+    call: Any = eval(f"lambda {', '.join(['value', *names])}: native({', '.join(['value', *given])})", {"native": native})
 
-    def call(*arguments: Any) -> Any:
-        given = map(_passed, arguments)
+    def nothing(*arguments: Any) -> Any:
+        # Numba raises what prebuilt code cannot.
+        return kernel.numba(*arguments) if call(None, *arguments) else None
+
+    returned: Any = _PASSED.get(result)
+
+    def number(*arguments: Any) -> Any:
         value = returned()
-        if native(ctypes.byref(value), *given):
-            return kernel.numba(*arguments)  # which raises what prebuilt code cannot
-        return None if result == "n" else value.value
+        return kernel.numba(*arguments) if call(ctypes.byref(value), *arguments) else value.value
 
-    return call
+    return nothing if result == "n" else number
