@@ -45,6 +45,12 @@ class Kernel:
         return with_numba.kernel(self.py_func)
 
     @functools.cached_property
+    def by_numbers(self) -> Callable[..., int]:
+        """What runs it for whole numbers."""
+        found: Callable[..., int] = prebuilt.of_numbers(self, self.py_func.__code__.co_argcount) or self.numba
+        return found
+
+    @functools.cached_property
     def _within(self) -> Any:
         from birthsim_env.physics.compiled import with_numba  # late: as above
 
@@ -66,6 +72,13 @@ def kernel(function: F) -> F:
 def helper(function: F) -> F:
     """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
     return plain(function) if DEBUG else Kernel(function, inlined=True)  # type: ignore[return-value]
+
+
+def of_numbers(kernel: Callable[..., int]) -> Callable[..., int]:
+    """What runs a kernel of whole numbers that returns one, without a look at its arguments: for whoever calls it often.
+
+    An array is passed by its address, with what else is fixed in an array of whole numbers that is kept along."""
+    return kernel.by_numbers if isinstance(kernel, Kernel) else kernel
 
 
 class Late:

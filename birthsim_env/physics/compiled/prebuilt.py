@@ -97,17 +97,19 @@ def _arrays_are_as_known() -> bool:
 
 
 def kind_of(value: Any) -> Any:
-    """The kind of an argument, quickly; ``_code`` names it."""
+    """The kind of an argument, quickly; ``code_of`` names it."""
     if type(value) is np.ndarray:
         return value.dtype, value.ndim, value.flags.num
-    return (type(value), kind_of(value.rows)) if isinstance(value, Named) else type(value)
+    kind = type(value)
+    return (kind, kind_of(value.rows)) if kind not in _NUMBERS and isinstance(value, Named) else kind
 
 
-def _code(kind: Any) -> str:
+def code_of(kind: Any) -> str:
+    """What a key has for a kind of arguments; ? where no prebuilt code takes one."""
     if not isinstance(kind, tuple):
         return _NUMBERS.get(kind, "?")
     if len(kind) == 2:
-        return f"{kind[0].__module__}.{kind[0].__qualname__}:{_code(kind[1]).replace('F', 'A')}"
+        return f"{kind[0].__module__}.{kind[0].__qualname__}:{code_of(kind[1]).replace('F', 'A')}"
     dtype, axes, flags = kind
     order = "C" if flags & _C else "F" if flags & _F else "A"
     known = dtype.isnative and flags & _ALIGNED
@@ -147,14 +149,9 @@ def address(kernel: "Kernel", count: int) -> int:
     return 0 if native is None else int(ctypes.cast(native, ctypes.c_void_p).value or 0)
 
 
-def _passed(value: Any) -> Any:
-    array = value.rows if isinstance(value, Named) else value
-    return id(array) + _HEAD if type(array) is np.ndarray else array
-
-
 def function(kernel: "Kernel", kinds: tuple[Any, ...]) -> Callable[..., Any] | None:
     """What calls the prebuilt code of a kernel for arguments of these kinds; None where there is none."""
-    codes = [_code(kind) for kind in kinds]
+    codes = [code_of(kind) for kind in kinds]
     native, result = found(kernel, codes)
     if native is None:
         return None
@@ -162,13 +159,20 @@ def function(kernel: "Kernel", kinds: tuple[Any, ...]) -> Callable[..., Any] | N
         return of_numbers(kernel, len(codes))  # type: ignore[no-any-return]
     native.argtypes = [ctypes.c_void_p, *(_PASSED.get(code, ctypes.c_int64) for code in codes)]
     native.restype = ctypes.c_int32
-    returned: Any = _PASSED.get(result, ctypes.c_int64)
+    # A loop over arguments would take as long as the call.
+    names = [f"a{k}" for k in range(len(codes))]
+    ways = {True: "{}", False: f"id({{}}) + {_HEAD}"}
+    given = [ways[code in _PASSED].format(name + ".rows" * (":" in code)) for name, code in zip(names, codes, strict=True)]
+    call: Any = eval(f"lambda {', '.join(['value', *names])}: native({', '.join(['value', *given])})", {"native": native})
 
-    def call(*arguments: Any) -> Any:
-        given = map(_passed, arguments)
+    def nothing(*arguments: Any) -> Any:
+        # Numba raises what prebuilt code cannot.
+        return kernel.numba(*arguments) if call(None, *arguments) else None
+
+    returned: Any = _PASSED.get(result)
+
+    def number(*arguments: Any) -> Any:
         value = returned()
-        if native(ctypes.byref(value), *given):
-            return kernel.numba(*arguments)  # which raises what prebuilt code cannot
-        return None if result == "n" else value.value
+        return kernel.numba(*arguments) if call(ctypes.byref(value), *arguments) else value.value
 
-    return call
+    return nothing if result == "n" else number
