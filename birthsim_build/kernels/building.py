@@ -20,7 +20,7 @@ from llvmlite.binding import llvm_version_info
 from tqdm import tqdm
 
 from birthsim_build.kernels import compiling
-from birthsim_build.kernels.libraries import join
+from birthsim_build.kernels.joining import join
 from birthsim_build.kernels.paths import PATHS
 from birthsim_build.kernels.recording import record
 from birthsim_build.kernels.wanted import Wanted, asked, declared
