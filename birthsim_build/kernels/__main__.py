@@ -1,8 +1,7 @@
-"""``make kernels``: builds what the package carries of machine code.
+"""``make kernels``: builds the machine code that the package carries, ``birthsim_env/prebuilt``.
 
-    python -m birthsim_build.kernels                  into birthsim_env/prebuilt
-    python -m birthsim_build.kernels --check          likewise; fails where that had other bytes of the same sources
-    python -m birthsim_build.kernels --every          libraries for Windows and macOS too, into out/kernels/every
+It is built anew at a release. With ``--check`` it fails where there were other bytes of the same sources; with ``--every``
+libraries for Windows and macOS are built too, into ``out/kernels/every``.
 """
 
 import argparse

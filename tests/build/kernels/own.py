@@ -1,4 +1,4 @@
-"""Kernels of every kind of argument, and what builds a library of them: ``python -m tests.build.kernels.own OUT WORK [reversed]``."""
+"""Kernels of every kind of argument; ``python -m tests.build.kernels.own OUT WORK [reversed]`` builds a library of them."""
 
 import sys
 from pathlib import Path
@@ -56,9 +56,9 @@ def named(pair, result):
 
 LAYOUT = f"{Pair.__module__}.{Pair.__qualname__}"
 KINDS = [
-    (numbers, "i d b u"), (counted, "i i"), (is_large, "d"), *((summed, f"{array} d1C") for array in ("d2C", "d2F", "d2A", "d2Cr", "f2C")),
-    (named, f"{LAYOUT}:d2C d1C"),
-]  # fmt: skip
+    *((numbers, "i d b u"), (counted, "i i"), (is_large, "d"), (named, f"{LAYOUT}:d2C d1C")),
+    *((summed, f"{array} d1C") for array in ("d2C", "d2F", "d2A", "d2Cr", "f2C")),
+]
 
 
 def main(out, work, *order):
