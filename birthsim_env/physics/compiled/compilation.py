@@ -7,6 +7,8 @@ whether it runs in a vector register or alone. Numba is imported when a kernel i
 """
 
 import functools
+import pickle
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
@@ -34,13 +36,19 @@ class Kernel:
             ready = self._ready[kinds] = prebuilt.function(self, kinds) or self.numba
         return ready(*arguments)
 
-    def __reduce__(self) -> str:
-        return self.py_func.__qualname__
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        """By name; by value what another process would not find by that: a script's own, and what stands in a function."""
+        name, module = self.py_func.__qualname__, self.py_func.__module__
+        if module != "__main__" and getattr(sys.modules.get(module), name, None) is self:
+            return name
+        from birthsim_env.physics.compiled import with_numba  # late: prebuilt code needs none of it
+
+        return _loaded, (with_numba.dumped(self.py_func), self.inlined)
 
     @functools.cached_property
     def numba(self) -> Any:
         """What Numba makes of it."""
-        from birthsim_env.physics.compiled import with_numba  # late: prebuilt code needs none of it
+        from birthsim_env.physics.compiled import with_numba  # late: as above
 
         return with_numba.kernel(self.py_func)
 
@@ -60,6 +68,10 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """What other kernels see of it."""
         return self._within._numba_type_
+
+
+def _loaded(content: bytes, inlined: bool) -> Kernel:
+    return Kernel(pickle.loads(content), inlined)
 
 
 def kernel(function: F) -> F:

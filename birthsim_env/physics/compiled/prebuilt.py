@@ -66,10 +66,15 @@ _C, _F, _ALIGNED, _WRITEABLE = 0x1, 0x2, 0x100, 0x400
 def target() -> str:
     """The library's file for this machine, whether or not it is there; empty where none can be."""
     machine = _MACHINES.get(platform.machine(), "")
-    if machine == "x86-64-v3":
-        found = (np._core if hasattr(np, "_core") else np.core)._multiarray_umath.__cpu_features__
-        machine = machine if all(found.get(one) for one in ("AVX2", "FMA3", "F16C")) else ""
+    if machine == "x86-64-v3" and not all(_features().get(one) for one in ("AVX2", "FMA3", "F16C")):
+        machine = ""
     return f"{machine}.{ENDINGS[sys.platform]}" if machine and sys.platform in ENDINGS else ""
+
+
+def _features() -> dict[str, bool]:
+    """What this processor has, as NumPy found it."""
+    found: dict[str, bool] = (np._core if hasattr(np, "_core") else np.core)._multiarray_umath.__cpu_features__
+    return found
 
 
 @cache

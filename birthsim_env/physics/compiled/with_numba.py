@@ -137,3 +137,9 @@ def compiled_stage(stage: Any, layouts: Sequence[Any]) -> Any:
     if arguments not in stage.numba.overloads:
         stage.numba.compile(types.int64(*arguments))
     return stage.numba.overloads[arguments]
+
+
+def dumped(function: Callable[..., Any]) -> bytes:
+    """A function by value, with what it refers to."""
+    content: bytes = serialize.dumps(function)  # type: ignore[no-untyped-call]
+    return content
