@@ -1,1 +1,1 @@
-"""Prebuilt kernels: which there are, their code for every target, and the libraries that the package carries (``make kernels``)."""
+"""Prebuilt kernels, ``make kernels``: which there are, their code for every target, and libraries that the package carries."""

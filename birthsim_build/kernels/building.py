@@ -1,7 +1,7 @@
 """Builds the folder that ``compiled.prebuilt`` reads: libraries, the index of their kernels, and what their sources hold.
 
-Objects are kept, a kernel a file, under all that they depend on, so that after an edit only what was edited is compiled. The bytes
-are those of a build from nothing, since each kernel is compiled in a process of its own.
+Objects are kept, a kernel a file, under all that they depend on, so that after an edit only what was edited is compiled.
+The bytes are those of a build from nothing, since each kernel is compiled in a process of its own.
 """
 
 import hashlib
@@ -9,7 +9,6 @@ import json
 import os
 import pickle
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ from llvmlite.binding import llvm_version_info
 from tqdm import tqdm
 
 from birthsim_build.kernels import compiling
-from birthsim_build.kernels.libraries import join
+from birthsim_build.kernels.joining import join
 from birthsim_build.kernels.paths import PATHS
 from birthsim_build.kernels.recording import record
 from birthsim_build.kernels.wanted import Wanted, asked, declared
@@ -54,37 +53,35 @@ def build(out: Path, libraries: Sequence[str], work: Path) -> list[Made]:
 def made(kernels: Sequence[Wanted], libraries: Sequence[str], work: Path) -> list[Made]:
     """Compile kernels, on all processors, but for what is kept of them in ``work``."""
     folder = make_folder(work / "objects")
-    jobs = [(one, tuple(libraries), folder) for one in kernels]
+    # Of the sources that are imported here: a kernel that is edited meanwhile is compiled as it was.
+    stamps = [stamp_of(one.kernel.py_func) for one in kernels]
+    jobs = [(one, _place(one, stamp, folder), libraries) for one, stamp in zip(kernels, stamps, strict=True)]
     # The longest first.
     order = sorted(range(len(jobs)), key=lambda k: -len(jobs[k][0].kernel.py_func.__code__.co_code))
     with get_context("fork").Pool(len(os.sched_getaffinity(0)), maxtasksperchild=1) as pool:
         results = pool.imap(_made, [jobs[k] for k in order], chunksize=1)
         done = dict(zip(order, tqdm(results, "kernels", len(jobs), leave=False, unit=" kernels"), strict=True))
-    return [Made(one, *done[k]) for k, one in enumerate(kernels)]
+    return [Made(one, stamp, *done[k]) for k, (one, stamp) in enumerate(zip(kernels, stamps, strict=True))]
 
 
-def _made(job: tuple[Wanted, Sequence[str], Path]) -> tuple[str, str, dict[str, bytes]]:
-    """Stamp, result and objects of a kernel."""
-    wanted, libraries, folder = job
-    stamp = stamp_of(wanted.kernel.py_func)
-    symbol = symbol_of(wanted.key)
-    kind = hashlib.sha256(repr((stamp, _builder())).encode()).hexdigest()[:16]
-    place = folder / f"{symbol}-{kind}.objects"
+def _place(wanted: Wanted, stamp: str, folder: Path) -> Path:
+    """Where the objects of a kernel are kept."""
+    versions = numba.__version__, llvmlite.__version__, llvm_version_info
+    built = stamp, *versions, source_stamp(Path(compiling.__file__).resolve())
+    return folder / f"{symbol_of(wanted.key)}-{hashlib.sha256(repr(built).encode()).hexdigest()[:16]}.objects"
+
+
+def _made(job: tuple[Wanted, Path, Sequence[str]]) -> tuple[str, dict[str, bytes]]:
+    """Result and objects of a kernel."""
+    wanted, place, libraries = job
     held = kept(place)
     result, objects = pickle.loads(held) if held else ("", {})
     missing = [name for name in libraries if name not in objects]
     if missing:
-        result, new = compiling.objects_of(wanted.kernel, wanted.kinds, symbol, missing)
+        result, new = compiling.objects_of(wanted.kernel, wanted.kinds, symbol_of(wanted.key), missing)
         objects = {**objects, **new}
         keep(place, pickle.dumps((result, objects)))
-    return stamp, result, {name: objects[name] for name in libraries}
-
-
-@cache
-def _builder() -> tuple[object, ...]:
-    """What objects depend on besides their kernels."""
-    versions = numba.__version__, llvmlite.__version__, llvm_version_info
-    return *versions, source_stamp(Path(compiling.__file__).resolve())
+    return result, {name: objects[name] for name in libraries}
 
 
 def write(out: Path, kernels: Sequence[Made], libraries: Iterable[str]) -> None:

@@ -1,7 +1,7 @@
 """Objects of one kernel for every library: Numba's code as it is before LLVM sees it, optimised for each processor by itself.
 
-Numba's passes are run in Numba's order, but for the library's processor. Code that is optimised already, and once more for another
-processor, is slower by a tenth.
+Numba's passes are run in Numba's order, but for the library's processor. Code that was optimised already, and is once more for
+another processor, is slower by a tenth.
 """
 
 import re

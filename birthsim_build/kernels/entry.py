@@ -13,7 +13,8 @@ _FIELDS = {"data": 0, "dimensions": 16, "strides": 24}
 
 
 def entry_code(symbol: str, native: str, kinds: Sequence[str], arguments: Sequence[Any], result: str) -> str:
-    """The code of ``symbol``, which calls ``native`` with ``arguments`` of these Numba types; ``kinds`` and ``result`` as in keys."""
+    """The code of ``symbol``, which calls ``native`` with ``arguments`` of these Numba types; ``kinds`` and ``result`` are
+    those of keys."""
     before, passed = list[str](), list[str]()
     for k, (kind, argument) in enumerate(zip(kinds, arguments, strict=True)):
         if kind in NUMBERS:

@@ -1,7 +1,7 @@
 """Users' paths on which kernels are called with arrays, or generated; what loops call by address is known without them.
 
-A path is a command of ``birthsim``, whose results go to the folder ``{out}``, or a function. What is on none of them is compiled
-by Numba when it is first asked for. Gradients have a kernel a stage, each generated for what its loop differentiates; paths
+A path is a command of ``birthsim``, whose results go to the folder ``{out}``, or a function. What is on none of them Numba
+compiles when it is first asked for. Gradients have a kernel a stage, each generated for what its loop differentiates; paths
 have those that the package's own policies were trained with.
 """
 

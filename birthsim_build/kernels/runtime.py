@@ -1,6 +1,6 @@
 """What Numba's code calls for arrays of its own: memory that is counted, here by LLVM code for any target.
 
-``np.empty`` in a kernel asks for a head of six words, of which the fourth word is the address of the data, and counts who holds it.
+``np.empty`` in a kernel asks for a head of six words, the fourth of which is the address of the data, and counts who holds it.
 """
 
 import re
@@ -59,4 +59,6 @@ done:
 
 def without_counts(code: str) -> str:
     """Code that calls the functions above that count, where Numba has written its own for this processor."""
-    return re.sub(r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}$", r"declare void @\1(ptr)", code, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(
+        r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}$", r"declare void @\1(ptr)", code, flags=re.MULTILINE | re.DOTALL
+    )

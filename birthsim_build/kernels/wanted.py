@@ -1,4 +1,4 @@
-"""Which kernels are built: those that loops call by address, as their declarations say, and what users' paths ask for besides."""
+"""Which kernels are built: those that loops call by address, as declarations say, and what users' paths ask for besides."""
 
 from collections.abc import Iterator
 from importlib import import_module
@@ -27,7 +27,7 @@ class Wanted(NamedTuple):
 
 
 def declared() -> list[Wanted]:
-    """Kernels of whole numbers and of blocks of named rows that return a whole number, as stages do: loops call them by address."""
+    """Kernels of whole numbers and blocks of named rows that return one, as stages do: loops call them by address."""
     return [Wanted(kernel, ("i",) * len(layouts_of(kernel))) for kernel in _kernels() if _is_of_numbers(kernel)]
 
 
@@ -58,5 +58,6 @@ def _kernels() -> Iterator[Kernel]:
 
 def _is_of_numbers(kernel: Any) -> bool:
     hints = get_type_hints(kernel.py_func)
-    returned = hints.pop("return", None)
-    return returned is int and all(kind is int or layout for kind, layout in zip(hints.values(), layouts_of(kernel), strict=True))
+    if hints.pop("return", None) is not int:
+        return False
+    return all(kind is int or layout for kind, layout in zip(hints.values(), layouts_of(kernel), strict=True))
