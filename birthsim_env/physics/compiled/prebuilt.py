@@ -92,6 +92,16 @@ def _opened() -> tuple[Any, dict[str, list[Any]]]:
         return nothing
 
 
+def described() -> str:
+    """What is there for this machine, in words."""
+    library, kernels = _opened()
+    return (
+        f"{len(kernels)} kernels in {FOLDER / target()}"
+        if library
+        else "none: Numba compiles kernels when they are first called"
+    )
+
+
 def _arrays_are_as_known() -> bool:
     """Whether an array's fields stand where prebuilt code reads them."""
     array = np.zeros((2, 3))[:, 1:]
