@@ -1,4 +1,4 @@
-"""Kernels of every kind of argument; ``python -m tests.build.kernels.own OUT WORK [reversed]`` builds a library of them."""
+"""Kernels of every kind of argument; ``python -m tests.build.kernels.own OUT WORK [reversed] [every]`` builds them."""
 
 import sys
 from pathlib import Path
@@ -61,15 +61,16 @@ KINDS = [
 ]
 
 
-def main(out, work, *order):
+def main(out, work, *how):
     from birthsim_build.kernels.building import made, write
-    from birthsim_build.kernels.libraries import SHIPPED
+    from birthsim_build.kernels.libraries import LIBRARIES, SHIPPED
     from birthsim_build.kernels.wanted import Wanted
     from birthsim_env.files import make_folder
 
     wanted = [Wanted(one, tuple(kinds.split())) for one, kinds in KINDS]
-    found = {one.wanted.key: one for one in made(wanted[::-1] if order else wanted, SHIPPED, work)}
-    write(make_folder(out), [found[key] for key in sorted(found)], SHIPPED)
+    libraries = list(LIBRARIES) if "every" in how else SHIPPED
+    found = {one.wanted.key: one for one in made(wanted[::-1] if "reversed" in how else wanted, libraries, work)}
+    write(make_folder(out), [found[key] for key in sorted(found)], libraries)
 
 
 if __name__ == "__main__":

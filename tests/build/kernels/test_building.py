@@ -11,16 +11,16 @@ import pytest
 from birthsim_build.code.elf import undefined_in
 from birthsim_build.kernels.__main__ import ENVIRONMENT
 from birthsim_build.kernels.kinds import result_of, types_of
-from birthsim_build.kernels.libraries import SHIPPED
+from birthsim_build.kernels.libraries import LIBRARIES, SHIPPED
 from birthsim_env.physics.compiled import prebuilt
 from tests.build.kernels import own
 from tests.build.targets import need_linker
 from tests.console import ROOT
 
 
-def build(out, work, seed="0", *order):
+def build(out, work, seed="0", *how):
     environment = {**os.environ, **ENVIRONMENT, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(work)}
-    line = [sys.executable, "-m", "tests.build.kernels.own", str(out), str(work), *order]
+    line = [sys.executable, "-m", "tests.build.kernels.own", str(out), str(work), *how]
     subprocess.run(line, check=True, env=environment, cwd=out.parent, capture_output=True, text=True)
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in out.iterdir()}
 
@@ -59,6 +59,15 @@ def test_a_build_that_compiles_nothing_has_the_same_bytes(built):
     kept = {path: path.stat().st_mtime_ns for path in (folder / "work" / "objects").iterdir()}
     assert build(folder / "again", folder / "work") == built[1]
     assert {path: path.stat().st_mtime_ns for path in (folder / "work" / "objects").iterdir()} == kept
+
+
+@pytest.mark.slow
+def test_libraries_for_windows_and_macos_are_linked(built, tmp_path):
+    """Nobody has run them."""
+    files = build(tmp_path / "every", tmp_path / "work", "0", "every")
+    assert {name: files[name] for name in SHIPPED} == {name: built[1][name] for name in SHIPPED}
+    heads = {name: (tmp_path / "every" / name).read_bytes()[:4] for name in LIBRARIES if name not in SHIPPED}
+    assert heads == {"x86-64-v3.dll": b"MZ\x78\x00", "aarch64.dylib": b"\xcf\xfa\xed\xfe"}
 
 
 def test_a_library_knows_no_path_and_asks_for_memory_alone(built):
