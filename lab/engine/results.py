@@ -1,6 +1,7 @@
 """Results: one JSON file a study, with what made it, and whether the sources are still those."""
 
 import json
+import os
 import platform
 import subprocess
 import sys
@@ -76,7 +77,7 @@ def changed(content: Content, functions: Iterable[Callable[..., Any]]) -> list[s
     """
     then = content["sources"]
     if "used" not in content:
-        return [path for path, code in then.items() if not (ROOT / path).is_file() or source(ROOT / path).code != code]
+        return [path for path, code in then.items() if not os.path.isfile(ROOT / path) or source(ROOT / path).code != code]
     known = {f"{file}:{name}": code for file, names in then.items() for name, code in names.items()}
     return [place for place, code in _called(functions, content["used"]).items() if known.get(place) != code]
 
