@@ -28,7 +28,7 @@ def objects_of(kernel: Any, kinds: Sequence[str], symbol: str, libraries: Sequen
     return result, {name: _object(code, entry, name, symbol) for name in libraries}
 
 
-@global_compiler_lock
+@global_compiler_lock  # type: ignore[untyped-decorator]
 def _numbas_code(kernel: Any, kinds: Sequence[str]) -> tuple[str, str, tuple[Any, ...], str]:
     """Symbol and code of what Numba makes, not optimised; with the types of its arguments and the kind of its result."""
     _leave_functions_alone()
@@ -44,7 +44,7 @@ def _numbas_code(kernel: Any, kinds: Sequence[str]) -> tuple[str, str, tuple[Any
 @cache
 def _leave_functions_alone() -> None:
     """Numba optimises functions for the processor that it runs on as it adds them."""
-    codegen = cpu_target.target_context.codegen()  # type: ignore[no-untyped-call]
+    codegen = cpu_target.target_context.codegen()
     builder = codegen._pass_builder()
     codegen._function_pass_manager = lambda: (llvm.create_new_function_pass_manager(), builder)
 

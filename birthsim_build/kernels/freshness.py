@@ -1,7 +1,7 @@
 """Which prebuilt kernels are those of the sources that are here."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -23,7 +23,7 @@ def stale() -> list[str]:
     return sorted(old | {key for key, one in here.items() if kernels.get(key, [""])[0] != stamp_of(one.py_func)})
 
 
-def _named(keys: Iterator[str]) -> Iterator[tuple[str, Kernel]]:
+def _named(keys: Iterable[str]) -> Iterator[tuple[str, Kernel]]:
     """Keys of kernels that are here."""
     for key in keys:
         module, _, name = key.partition(" ")[0].rpartition(".")

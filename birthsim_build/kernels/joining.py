@@ -24,3 +24,4 @@ def join(name: str, objects: Mapping[str, bytes], out: Path) -> None:
             link("cc", "-target", _ZIG[name], "-shared", "-s", "-o", str(out), *places)
         else:
             link("ld.lld", "-m", EMULATIONS[name.removesuffix(".so").removesuffix("-v3")], *_ELF, "-o", str(out), *places)
+    out.chmod(0o644)

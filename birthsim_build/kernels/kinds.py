@@ -12,7 +12,7 @@ from birthsim_env.loop.stage import layouts_of
 from birthsim_env.physics.compiled.record_types import Record, block_type
 
 _NUMBERS = {"i": types.int64, "d": types.float64, "b": types.boolean, "u": types.uint64}
-_RESULTS = {**{kind: code for code, kind in _NUMBERS.items()}, types.none: "n"}
+_RESULTS: dict[Any, str] = {**{kind: code for code, kind in _NUMBERS.items()}, types.none: "n"}
 
 
 def types_of(kernel: Any, kinds: Sequence[str]) -> tuple[Any, ...]:
@@ -24,7 +24,7 @@ def types_of(kernel: Any, kinds: Sequence[str]) -> tuple[Any, ...]:
 
 def result_of(returned: Any) -> str:
     """The kind of what is returned; ``ValueError`` for what prebuilt code does not hand on."""
-    kind = types.unliteral(returned)
+    kind: Any = types.unliteral(returned)  # type: ignore[no-untyped-call]
     if kind not in _RESULTS:
         raise ValueError(f"a kernel returns {returned}; allowed: {', '.join(map(str, _RESULTS))}")
     return _RESULTS[kind]
@@ -38,7 +38,7 @@ def _type_of(kind: str) -> Any:
         return Record(_named(layout), _type_of(array))
     axes = array[1:].rstrip("CFAr")
     order = array[1 + len(axes)]
-    return types.Array(from_dtype(np.dtype(array[0])), int(axes), order, readonly=array.endswith("r"))  # type: ignore[no-untyped-call]
+    return types.Array(from_dtype(np.dtype(array[0])), int(axes), order, readonly=array.endswith("r"))  # type: ignore[call-overload]
 
 
 def _named(layout: str) -> Any:

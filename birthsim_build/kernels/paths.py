@@ -1,8 +1,8 @@
 """Users' paths on which kernels are called with arrays, or generated; what loops call by address is known without them.
 
 A path is a command of ``birthsim``, whose results go to the folder ``{out}``, or a function. What is on none of them Numba
-compiles when it is first asked for. Gradients have a kernel a stage, each generated for what its loop differentiates; paths
-have those that the package's own policies were trained with.
+compiles when it is first asked for. Gradients have a kernel a stage, each generated for what its loop differentiates: those of
+a policy without a law below it are the same in every scenario.
 """
 
 from collections.abc import Callable
@@ -50,10 +50,6 @@ def physics() -> None:
     exact.number("sine", 0.0)
 
 
-def _training(config: str, *more: str) -> tuple[str, ...]:
-    return "train", "--config", config, "--steps", "1", "--out", "{out}/training", *more
-
-
 PATHS: dict[str, Callable[[], None] | tuple[str, ...]] = {
     "environments": environments,
     "controllers": controllers,
@@ -63,10 +59,6 @@ PATHS: dict[str, Callable[[], None] | tuple[str, ...]] = {
         *("evaluate", "--controller", "backstepping", "residual", "--policy", "circle"),
         *("--episodes", "1", "--jobs", "1", "--out", "{out}/evaluation"),
     ),
-    "train": _training("circle_quick"),
-    **{
-        f"train by gradients, {scenario}": _training("circle_apg", "--env", environment_id(scenario).replace("-", "Residual-"))
-        for scenario in ("circle", "descent", "forceps", "dystocia", "vacuum")
-    },
-    **{f"train {name}": _training(name) for name in ("probe_apg", "circle_residual_apg", "circle_lab_apg")},
+    "train": ("train", "--config", "circle_quick", "--steps", "1", "--out", "{out}/training"),
+    "train by gradients": ("train", "--config", "circle_apg", "--steps", "1", "--out", "{out}/training"),
 }

@@ -54,7 +54,7 @@ def main(name: str, folder: Path) -> None:
         return found(kernel, kinds)
 
     prebuilt.found, prebuilt.FOLDER = noted, Path(os.environ[LIBRARY])
-    _walk(name, folder)
+    walk(name, folder)
     texts = {module: text for module, text in TEXTS.items() if any(key.startswith(f"{module}.") for key in asked)}
     keys = sorted(key for key in asked if is_ours(key) or key.partition(".")[0] in texts)
     # A kind that no key can name ends with what Numba makes of it.
@@ -62,7 +62,8 @@ def main(name: str, folder: Path) -> None:
     write_json(folder / "asked.json", {"keys": known, "texts": sorted(texts.values())})
 
 
-def _walk(name: str, folder: Path) -> None:
+def walk(name: str, folder: Path) -> None:
+    """Walk one path; what it writes goes to ``folder``."""
     from birthsim_build.kernels.paths import PATHS  # late: modules ask for kernels as they are imported
 
     path = PATHS[name]

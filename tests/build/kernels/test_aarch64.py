@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from baselines.driving import driving
 from baselines.named import controlling_names, make_controller
 from birthsim_build.code.tools import run_tool
 from birthsim_build.kernels.libraries import SHIPPED
@@ -18,6 +19,8 @@ from birthsim_env.registry import names
 from tests.build.kernels.recorded import recorded
 from tests.build.targets import need_linker, need_program
 
+WORN = {"valves.deadband": 0.05, "valves.hysteresis": 0.04, "valves.opening_limit": 0.7}
+OPTIONS = {"air.supply_conductance": 1e-8, "mechanics.mode_frequency": 20.0, "chambers.tube_length": 1.0}
 LANES = 33
 """A block, which is vectorised, and a lane of another."""
 
@@ -33,25 +36,32 @@ def replay(tmp_path_factory):
     return lambda run: subprocess.run(line, input=run.record(), capture_output=True, check=True).stdout
 
 
+def step(name, **how):
+    env = gymnasium.make_vec(environment_id(name), num_envs=LANES, randomize=True, **how)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    for _ in range(5):
+        env.step(env.action_space.sample())
+    env.close()
+
+
 def environments():
     for scenario in names("scenario"):
         for sensors in names("sensors"):
-            env = gymnasium.make_vec(environment_id(scenario), num_envs=LANES, sensors=sensors, randomize=True)
-            env.reset(seed=0)
-            env.action_space.seed(0)
-            for _ in range(5):
-                env.step(env.action_space.sample())
-            env.close()
+            step(scenario, sensors=sensors)
+
+
+def hands_and_rigs():
+    for hand in names("hand"):
+        step("circle", user_force=hand)
+    for options in (WORN, {**WORN, **OPTIONS}):
+        step("circle", parameters=Parameters().replace(options))
 
 
 def controllers():
-    env = gymnasium.make_vec(environment_id("circle"), num_envs=LANES, sensors="lab", policy_period=1e-3, randomize=True)
-    env.reset(seed=0)
-    for name in controlling_names():
-        law = make_controller(name, Parameters())
-        for _ in range(5):
-            env.step(law.command(env.measurement, env.reference).T)
-    env.close()
+    for name in (*controlling_names(), "limited:pid", "residual:circle", "residual:circle_honest_student"):
+        law = driving(make_controller(name, Parameters()), name)
+        step("circle", sensors="lab", policy_period=1e-3, actuation=law)
 
 
 def is_fresh(run):
@@ -59,7 +69,7 @@ def is_fresh(run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("walk", "least"), [(environments, 10), (controllers, 10)])
+@pytest.mark.parametrize(("walk", "least"), [(environments, 10), (hands_and_rigs, 5), (controllers, 10)])
 def test_loops_have_the_same_bits(replay, monkeypatch, walk, least):
     runs = recorded(monkeypatch, walk)
     assert "aarch64.so" in SHIPPED
