@@ -12,6 +12,7 @@ from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.shared import anew
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 INTEGRATION_STEP = 0.25e-3
@@ -265,7 +266,7 @@ def integrate(
         copy(x, total, n)
         copy(x, trial, n)
         for k in range(STAGES):
-            right_hand_side(trial, u, f, p, dx, n)
+            right_hand_side(trial, u, f, anew(p), dx, n)
             stage(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
         copy(total, x, n)
         record_impacts(x, p, impacts, n)

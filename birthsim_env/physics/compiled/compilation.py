@@ -39,6 +39,9 @@ BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 
 ``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
 
+WARP = int(os.environ.get("BIRTHSIM_WARP", "0"))
+"""Threads of a block on a graphics processor, each with a lane of its own; 0 where no code for threads is compiled."""
+
 
 class _DiskCache(NullCache):
     """Machine code of one function: a file per signature and processor."""
@@ -54,7 +57,7 @@ class _DiskCache(NullCache):
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
-        how = (BLOCK, *(os.environ.get(f"NUMBA_{kind}_VECTORIZE") for kind in ("LOOP", "SLP")))
+        how = (BLOCK, WARP, *(os.environ.get(f"NUMBA_{kind}_VECTORIZE") for kind in ("LOOP", "SLP")))
         kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions, how)).encode()).hexdigest()
         return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
 
