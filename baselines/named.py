@@ -139,7 +139,10 @@ def known_options(name: str) -> list[str] | None:
     part = _part(plain) if known is None else known.made
     if is_ready(part) or not callable(part):
         return []
-    parameters = list(inspect.signature(part).parameters.values())
+    try:
+        parameters = list(inspect.signature(part).parameters.values())
+    except ValueError:  # a class of Python's own, or an heir of one
+        return None
     named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(part, "TUNABLE", {})
     guarded = GUARDING if _makes(part, StagedController) else ()
     closed = tunable or len(named) + 1 == len(parameters)

@@ -118,7 +118,7 @@ def make_vec(environment: str, num_envs: int = 1, **arguments: Any) -> BirthSIMV
 def _known(environment: str) -> str:
     """``environment``, where it is an id of BirthSIM's."""
     known = environments()
-    if environment not in known:
+    if not isinstance(environment, str) or environment not in known:
         asked = near(environment, known) if isinstance(environment, str) else ""
         raise ValueError(f"environment = {shown(environment)}{asked}; allowed: {', '.join(known)}")
     return environment

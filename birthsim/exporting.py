@@ -1,9 +1,9 @@
 """``birthsim.export``: what ``birthsim export`` writes, from Python."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
-from birthsim_env.physics.rig.values import near, shown
+from birthsim_env.physics.rig.values import near, path_of, shown
 from birthsim_env.registry import entry
 
 
@@ -43,6 +43,11 @@ def export(form: str, /, **options: Any) -> Path | None:
     for name, value in options.items():
         if name not in known:
             raise ValueError(f"{name} = {shown(value)}{near(name, known)}; allowed for {form}: {', '.join(known)}")
+    for name, kind in get_type_hints(chosen.settings).items():
+        if kind in (Path, Path | None) and name in options and options[name] is not None:
+            if path_of(options[name]) is None:
+                raise ValueError(f"{name} = {shown(options[name])}; allowed: a path")
+            options[name] = Path(options[name])
     try:
         settings = chosen.settings(to=form, **options)
     except TypeError as error:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
 from birthsim_env.physics.rig.values import shown
@@ -131,8 +132,10 @@ def normalized_score(
     100.0
     """
     known = reference_scores(environment, sensors, randomize)
-    if np.asarray(score).dtype.kind not in "iuf":
-        raise ValueError(f"score = {shown(score)}; allowed: a number or an array of numbers")
+    try:
+        given = floats_of(score)
+    except ValueError as error:
+        raise ValueError(f"score = {shown(score)}: {error}; allowed: a number or an array of numbers") from error
     nothing, best = known[SHUT]["return"], known[BEST]["return"]
-    scaled = 100.0 * (np.asarray(score, dtype=np.float64) - nothing) / (best - nothing)
+    scaled = 100.0 * (given - nothing) / (best - nothing)
     return scaled if scaled.ndim else float(scaled)

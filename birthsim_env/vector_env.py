@@ -14,6 +14,7 @@ from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import MOST_LANES
+from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.values import checked_count, shown, whole_of
 from birthsim_env.registry import entry
 from birthsim_env.reward import REWARD_TERMS
@@ -117,8 +118,9 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         """The lanes to reset: all, or those of ``options["reset_mask"]``."""
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
-        lanes = np.asarray(mask if isinstance(mask, (np.ndarray, list, tuple)) else None)
-        if lanes.shape != (self.num_envs,) or lanes.dtype != np.bool_ or not lanes.any():
+        listed = isinstance(mask, (np.ndarray, list, tuple)) and shape_of(mask) == (self.num_envs,)
+        lanes = np.asarray(mask if listed else None)
+        if lanes.dtype != np.bool_ or not lanes.any():
             raise ValueError(f"options['reset_mask'] = {shown(mask)}; allowed: ({self.num_envs},) of bool, at least one True")
         return lanes
 

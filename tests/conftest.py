@@ -15,6 +15,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import gymnasium
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture.providers import Constants, HypothesisProvider
 
 from birthsim_env.physics.compiled.plain import plain
 from tests.console import ROOT, run
@@ -25,6 +26,9 @@ collect_ignore = ["project/recipes"]
 
 # A process that a script starts in the background ignores Ctrl-C; tests that raise it need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Hypothesis also draws literals of all packages that a process happens to have imported: any commit would make other examples.
+HypothesisProvider._local_constants = Constants()
 
 # The same examples every time, and as long as a busy machine needs; make test-slow tries more, make fuzz others, mutants few.
 settings.register_profile("quick", deadline=None, derandomize=True, database=None)

@@ -4,6 +4,7 @@ The arrays are mean, variance, of layer k k.weight and k.bias, and of a memory e
 own.bias; the JSON has format, environment, residual settings, training configuration and a checksum of the file.
 """
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from agents.policy.network import PolicyNetwork
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from birthsim_env.files import finite, whole_file
+from birthsim_env.physics.rig.reading import named
 from birthsim_env.physics.rig.values import problem
 
 FORMAT = "birthsim-residual-3"
@@ -75,8 +77,8 @@ def read_policy(folder: str | Path) -> Policy:
     """Read a policy folder; raises ``ValueError`` that says what is missing, damaged or foreign."""
     folder = Path(folder)
     allowed = f"allowed: a folder that birthsim train wrote, with {WEIGHTS}"
-    if not (folder / WEIGHTS).is_file():
-        raise ValueError(f"policy = {str(folder)!r} has no {WEIGHTS}; {allowed}")
+    if not os.path.isfile(folder / WEIGHTS):
+        raise ValueError(f"policy = {named(folder)} has no {WEIGHTS}; {allowed}")
     try:
         arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
     except ValueError as error:

@@ -34,10 +34,11 @@ def policy_folders(path: str | os.PathLike[str]) -> list[Path]:
     if text is None:
         raise ValueError(f"policy = {shown(path)}; allowed: a folder that birthsim train wrote, or {', '.join(known)}")
     folder = entry("policy", text).made if text in known else Path(text)
-    if (folder / WEIGHTS).is_file():
+    if os.path.isfile(folder / WEIGHTS):
         return [folder]
+    seeds = folder.glob(f"seed_*/{WEIGHTS}") if os.path.isdir(folder) else ()
     found = sorted(
-        (place.parent for place in folder.glob(f"seed_*/{WEIGHTS}") if place.parent.name.removeprefix("seed_").isdecimal()),
+        (place.parent for place in seeds if place.parent.name.removeprefix("seed_").isdecimal()),
         key=lambda place: int(place.name.removeprefix("seed_")),
     )
     if not found:

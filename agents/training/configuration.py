@@ -145,7 +145,7 @@ def load_configuration(name: str | os.PathLike[str]) -> tuple[TrainingSettings, 
     """
     text = path_of(name) or ""
     path = FOLDER / f"{text}.toml" if text in configuration_names() else Path(text)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise ValueError(
             f"configuration = {shown(text or name)} is no file{near(text, configuration_names())}; allowed: "
             f"{', '.join(configuration_names())}, or a TOML file"

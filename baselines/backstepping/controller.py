@@ -214,7 +214,8 @@ class BacksteppingController(StagedController):
                 try:
                     gains_for(stiffness, apparent_mass, cylinder.viscous_friction, damping)
                 except ValueError as error:
-                    place = f"reference.stiffness = ({setpoints[0]:g}, {setpoints[1]:g}) N/m in lane {lane}"
+                    given = "" if damping is None else f"damping_ratio = {self.damping_ratio:g}, "
+                    place = f"{given}reference.stiffness = ({setpoints[0]:g}, {setpoints[1]:g}) N/m in lane {lane}"
                     raise ValueError(f"{place}, cylinder {i + 1}: {error}") from None
 
     def inspect(

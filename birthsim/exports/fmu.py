@@ -15,6 +15,7 @@ from birthsim_build.fmu.archive import BINARIES, VERSIONS, write_fmu
 from birthsim_build.fmu.model import fmu_model
 from birthsim_build.loops import law_part, scenario_world
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.reading import named
 from birthsim_env.registry import register
 
 
@@ -48,7 +49,7 @@ class Settings(Configured):
 def main(settings: Settings) -> None:
     """Write the file and count its variables."""
     if settings.out.suffix != ".fmu":
-        raise ValueError(f"--out {str(settings.out)!r}; allowed: a file that ends in .fmu")
+        raise ValueError(f"--out {named(settings.out)}; allowed: a file that ends in .fmu")
     if settings.controller and settings.policy:
         raise ValueError("--controller with --policy; allowed: one of them")
     scenario_of(settings.env)

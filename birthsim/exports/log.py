@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from baselines.logs.writing import WRITERS, write_log
 from birthsim.command_line.settings import Configured
 from birthsim.exports import Form
+from birthsim_env.physics.rig.reading import named
 from birthsim_env.registry import register
 from birthsim_live.logs.reading import read_log
 
@@ -30,7 +31,7 @@ class Settings(Configured):
 def main(settings: Settings) -> None:
     """Write the file and count its rows."""
     if settings.out.suffix != f".{settings.to}":
-        raise ValueError(f"--out {str(settings.out)!r}; allowed: a file that ends in .{settings.to}")
+        raise ValueError(f"--out {named(settings.out)}; allowed: a file that ends in .{settings.to}")
     log = read_log(settings.file)
     write_log(log, settings.out)
     rows = sum(len(one.times) for one in log.series)

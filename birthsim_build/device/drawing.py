@@ -30,7 +30,7 @@ from birthsim_env.loop.stage import scratch, table2
 from birthsim_env.loop.world import Start
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.gradients.source import choose
+from birthsim_env.gradients.source import choose, straight
 
 '''
 

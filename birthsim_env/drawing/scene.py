@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.values import shown, whole_of
 
 LEAST, LARGEST = (320, 240), (7680, 4320)
@@ -15,7 +16,7 @@ LEAST, LARGEST = (320, 240), (7680, 4320)
 def checked_size(name: str, size: Sequence[int]) -> tuple[int, int]:
     """``size`` (width, height) in px, or a ``ValueError`` that names it, its value and what is allowed."""
     (w, h), (wide, high) = LEAST, LARGEST
-    pair = [whole_of(one) for one in size] if isinstance(size, (tuple, list, np.ndarray)) and np.ndim(size) else []
+    pair = [whole_of(one) for one in size] if isinstance(size, (tuple, list, np.ndarray)) and shape_of(size) == (2,) else []
     width, height = pair if len(pair) == 2 else (None, None)
     if width is None or height is None or not (w <= width <= wide and h <= height <= high):
         raise ValueError(f"{name} = {shown(size)}; allowed: two whole numbers from {w} x {h} to {wide} x {high} px")

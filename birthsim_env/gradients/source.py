@@ -6,8 +6,8 @@ import hashlib
 import importlib.util
 import sys
 import tempfile
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Callable, Iterable
+from functools import cache, cached_property
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
@@ -41,6 +41,24 @@ else:
         return number(types.boolean, yes, no), generate
 
 
+class Straight:
+    """A function of arrays and a lane without a branch, which kernels call: what it is for Numba is made when one asks."""
+
+    def __init__(self, function: Callable[..., None]) -> None:
+        self._function = function
+
+    @cached_property
+    def _numba_type_(self) -> Any:
+        from birthsim_env.gradients import instructions  # late: code that is there already needs none of it
+
+        return instructions.type_of(self._function)
+
+
+def straight(function: Callable[..., None]) -> Any:
+    """Have each statement of a function made into instructions by itself; with ``BIRTHSIM_DEBUG=1`` it stays plain Python."""
+    return function if DEBUG else Straight(function)
+
+
 HEAD = '''"""Generated: derivatives of kernels."""
 
 import math
@@ -49,7 +67,7 @@ import numpy as np
 
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.gradients.source import choose
+from birthsim_env.gradients.source import choose, straight
 '''
 
 _INFIX = {
@@ -101,10 +119,14 @@ def loop(graph: Graph, name: str, arrays: Iterable[str], outputs: Iterable[Outpu
             else:
                 stack.append((value, True))
                 stack += [(a, False) for a in reversed(graph.nodes[value.at][1:]) if isinstance(a, Value)]
+    given = ", ".join(arrays)
+    lines = ["@straight", f"def {name}_lane({given}, i):"]
+    lines += [f"    t{k} = {_statement(graph, k)}" for k in order]
+    lines += [f"    {array}[{row}, i] = {_name(v if isinstance(v, Value) else float(v))}" for array, row, v in outputs]
+    lines += [] if outputs else ["    pass"]
     # Unsigned, so that no check for a negative index remains, at which LLVM would give up vectorising.
-    lines = ["@helper", f"def {name}({', '.join(arrays)}, n):", "    for lane in range(n):", "        i = np.uint64(lane)"]
-    lines += [f"        t{k} = {_statement(graph, k)}" for k in order]
-    lines += [f"        {array}[{row}, i] = {_name(v if isinstance(v, Value) else float(v))}" for array, row, v in outputs]
+    lines += ["", "", "@helper", f"def {name}({given}, n):", "    for lane in range(n):"]
+    lines += [f"        {name}_lane({given}, np.uint64(lane))"]
     return "\n".join([*lines, ""])
 
 

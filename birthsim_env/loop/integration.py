@@ -12,32 +12,18 @@ from birthsim_env.physics.compiled.compilation import WARP
 if not WARP:
     integrate = dynamics.integrate
 else:
-    from birthsim_env.loop.stage import scratch
     from birthsim_env.physics.compiled.compilation import helper
-    from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+    from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
     from birthsim_env.physics.compiled.shared import shared
+    from birthsim_env.physics.compiled.stack import scratch
 
     @helper
-    def integrate(
-        x: Array,
-        u: Array,
-        f: Array,
-        p: Array,
-        steps: int,
-        step: float,
-        impacts: Array,
-        dx: Array,
-        total: Array,
-        trial: Array,
-        n: int,
-    ) -> None:
+    def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, n: int) -> None:
         """``dynamics.integrate`` for a thread."""
-        state, openings, force, fastest, rig = scratch(STATES), scratch(4), scratch(2), scratch(2), shared(PARAMETERS)
-        dynamics.copy(x, state, n)
+        openings, force, fastest, rig = scratch(4), scratch(2), scratch(2), shared(PARAMETERS)
         dynamics.copy(u, openings, n)
         dynamics.copy(f, force, n)
         dynamics.copy(impacts, fastest, n)
         dynamics.copy(p, rig, n)
-        dynamics.integrate(state, openings, force, rig, steps, step, fastest, dx, total, trial, n)
-        dynamics.copy(state, x, n)
+        dynamics.integrate(x, openings, force, rig, steps, step, fastest, n)
         dynamics.copy(fastest, impacts, n)

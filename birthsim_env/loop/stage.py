@@ -22,11 +22,12 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.compiled.record_types import block_type
 from birthsim_env.physics.compiled.records import Rows
+from birthsim_env.physics.compiled.stack import scratch
 
 if TYPE_CHECKING or not DEBUG:
-    from birthsim_env.loop.machine import call, carray, pointer, scratch
+    from birthsim_env.loop.machine import call, carray, pointer
 else:
-    from birthsim_env.loop.plain import call, carray, pointer, scratch
+    from birthsim_env.loop.plain import call, carray, pointer
 
 __all__ = ["call", "carray", "pointer", "scratch"]
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ from birthsim_env.parts.times import timed
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.arrays import floats_of
+from birthsim_env.physics.rig.reading import named
 from birthsim_env.physics.rig.values import is_finite, path_of, problem, shown
 from birthsim_env.registry import entry, names
 from birthsim_env.tables.columns import columns, table_file
@@ -35,10 +37,12 @@ def from_file(kind: str, text: str) -> Any:
     """
     place, _, attribute = text.rpartition(":")
     path = Path(place)
+    if not os.path.isfile(path):
+        raise ValueError(f"{kind} file {named(path)} does not exist; allowed: path/to/file.py:Name")
     # No package has a path for a name, whatever the file is called; what stands before a dot would be a package, to pickle.
     spec = importlib.util.spec_from_file_location(str(path.resolve()).replace(".", "_"), path)
-    if not path.is_file() or spec is None or spec.loader is None:
-        raise ValueError(f"{kind} file {str(path)!r} does not exist; allowed: path/to/file.py:Name")
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{kind} file {named(path)} is no Python; allowed: path/to/file.py:Name")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # where dataclasses look their annotations up
     try:

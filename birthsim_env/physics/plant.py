@@ -28,7 +28,7 @@ LONGEST = 3600.0
 def checked(name: str, value: ArrayLike, shape: tuple[int, ...], unit: str) -> Array:
     """``value`` as a contiguous float64 array of ``shape``, or a ``ValueError`` that names what is wrong with it."""
     try:
-        array = np.ascontiguousarray(floats_of(value))
+        array = floats_of(value)
     except ValueError as error:
         raise ValueError(f"{name} = {shown(value)}: {error}; allowed: numbers of shape {shape} ({unit})") from error
     if array.shape != shape:
@@ -36,7 +36,7 @@ def checked(name: str, value: ArrayLike, shape: tuple[int, ...], unit: str) -> A
     if not np.isfinite(array).all():
         where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{name}{list(where)} = {array[where]}; allowed: finite numbers ({unit})")
-    return array
+    return np.ascontiguousarray(array)
 
 
 class Plant:

@@ -1,6 +1,7 @@
 """Results: one JSON file a study, with what made it, and whether the sources are still those."""
 
 import json
+import os
 import platform
 import subprocess
 import sys
@@ -26,6 +27,7 @@ before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, 
 
 _SCHEMA = {
     "date": str, "commit": str, "seconds": float, "settings": dict, "figures": (dict, list), "sources": Each((str, dict)),
+    "used?": Each(str),
 }  # fmt: skip
 MOST = 2**26
 """Bytes of a result; the largest has a million."""
@@ -76,8 +78,8 @@ def changed(content: Content, functions: Iterable[Callable[..., Any]]) -> list[s
     """
     then = content["sources"]
     if "used" not in content:
-        return [path for path, code in then.items() if not (ROOT / path).is_file() or source(ROOT / path).code != code]
-    known = {f"{file}:{name}": code for file, names in then.items() for name, code in names.items()}
+        return [path for path, code in then.items() if not os.path.isfile(ROOT / path) or source(ROOT / path).code != code]
+    known = {f"{file}:{name}": code for file, names in then.items() if isinstance(names, dict) for name, code in names.items()}
     return [place for place, code in _called(functions, content["used"]).items() if known.get(place) != code]
 
 

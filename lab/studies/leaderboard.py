@@ -136,7 +136,11 @@ def _not_allowed(name: str, folder: Path) -> str:
     said = f"controller = {shown(name)}"
     if beside := _BESIDE.fullmatch(name):
         file = folder / beside[1]
-        return "" if file.is_file() and not file.is_symlink() else f"{said}; allowed: a file beside the entry, and no link"
+        return (
+            ""
+            if os.path.isfile(file) and not os.path.islink(file)
+            else f"{said}; allowed: a file beside the entry, and no link"
+        )
     if name.startswith(f"{RESIDUAL}:"):
         return (
             ""

@@ -19,7 +19,7 @@ from birthsim_env.env import BirthSIMEnv
 from birthsim_env.registry import names
 from birthsim_env.vector_env import BirthSIMVectorEnv
 from tests.fuzz.rigs import run_a_little
-from tests.fuzz.strategies import near, strange
+from tests.fuzz.strategies import composite, near, sampled, strange
 from tests.fuzz.watched import cases, watched
 
 STEPS, CALLING = 4, 2**30
@@ -46,11 +46,11 @@ RESET = {"seed": (0, None), "position": ((0.5, 0.0),)}
 LANES = {"reset_mask": (None,), "staggered": (True, False)}
 
 
-@st.composite
+@composite
 def arguments(draw, table):
     """Some arguments of a table, one of which is odd more often than not."""
-    chosen = draw(st.lists(st.sampled_from(list(table)), unique=True, max_size=4))
-    given = {name: draw(st.sampled_from(table[name])) for name in chosen}
+    chosen = draw(st.lists(sampled(list(table)), unique=True, max_size=4))
+    given = {name: draw(sampled(table[name])) for name in chosen}
     if chosen and draw(st.integers(0, 2)):
         odd, usual = chosen[0], table[chosen[0]][0]
         given[odd] = draw(strange | near(usual) if isinstance(usual, float) else strange)
@@ -142,10 +142,10 @@ MADE = {
 }
 
 
-@st.composite
+@composite
 def odd_options(draw, options):
     """One or two options of all, odd or in the neighbourhood of what they are; now and then one that there is not."""
-    chosen = draw(st.lists(st.sampled_from(sorted(options) or ["unknown"]), unique=True, min_size=1, max_size=2))
+    chosen = draw(st.lists(sampled(sorted(options) or ["unknown"]), unique=True, min_size=1, max_size=2))
     if draw(st.integers(0, 19)) == 0:
         chosen.append("unknown")
     usual = {name: options.get(name) for name in chosen}
@@ -190,7 +190,7 @@ def test_a_part_or_settings(name, data):
     used(name)
     options = options_of(MADE[name])
     how = required(MADE[name]) | data.draw(odd_options(options))
-    with watched(*how, *options, "setpoint", "knots", runs_code=True, memory=CALLING):
+    with watched(*how, *options, "reference", "setpoint", "knots", runs_code=True, memory=CALLING):
         use(MADE[name](**how))
 
 

@@ -21,6 +21,7 @@ from birthsim_env.registry import entry, names
 from birthsim_live.rig.folder import packed_page
 from lab.engine.shelf import declared
 from tests.fuzz.rigs import odd_rig
+from tests.fuzz.strategies import sampled
 from tests.fuzz.watched import cases, watched
 
 ODD = (
@@ -29,7 +30,7 @@ ODD = (
     *("/", "..", "x\ny", "pid", "circle", "both", "lab", "BirthSIM/Circle-v1", "CartPole-v1", "BirthSIM/", "none", "true"),
     *("bandwidth=60", "--", "-x"),
 )
-WORDS = st.sampled_from(ODD) | st.text(st.characters(exclude_characters="\x00"), max_size=10)
+WORDS = sampled(ODD) | st.text(st.characters(exclude_characters="\x00"), max_size=10)
 BEFORE = {form: ["none.rec"] for form in ("parquet", "mcap")}
 """Words of an export without which it says no more than that they are missing."""
 
@@ -66,7 +67,7 @@ def test_a_command_line(name, data):
     settings, options = settings_of(name)
     form = name.partition(" ")[2]
     line = [*(["--to", form] if form else []), *BEFORE.get(form, [])]
-    chosen = data.draw(st.lists(st.sampled_from(options or ["--x"]), unique=True, max_size=4))
+    chosen = data.draw(st.lists(sampled(options or ["--x"]), unique=True, max_size=4))
     for option in chosen:
         line += [option, data.draw(WORDS)]
     if data.draw(st.integers(0, 4)) == 0:

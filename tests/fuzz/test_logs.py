@@ -17,7 +17,7 @@ from baselines.identification.trial import Trial
 from baselines.identification.windows import cut
 from baselines.named import make_controller
 from birthsim_env import Parameters
-from tests.fuzz.strategies import NUMBERS
+from tests.fuzz.strategies import NUMBERS, composite, sampled
 from tests.fuzz.watched import cases, watched
 
 SIGNALS = ("times", "openings", "pressures", "positions", "forces")
@@ -46,36 +46,34 @@ def fit(trial):
     assert np.isfinite([found.noise.pressure, found.noise.position]).all()
 
 
-@st.composite
+@composite
 def rows(draw, count):
     """Rows that something happens to: a stretch, scattered ones, or all."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    scattered = np.flatnonzero(rng.random(count) < draw(st.sampled_from((1e-3, 0.01, 0.3))))
-    first, length = draw(st.integers(0, count - 1)), draw(st.sampled_from((1, 3, 30, 300, count)))
-    return draw(st.sampled_from((scattered, np.arange(first, min(count, first + length)))))
+    scattered = np.flatnonzero(rng.random(count) < draw(sampled((1e-3, 0.01, 0.3))))
+    first, length = draw(st.integers(0, count - 1)), draw(sampled((1, 3, 30, 300, count)))
+    return draw(sampled((scattered, np.arange(first, min(count, first + length)))))
 
 
-@st.composite
+@composite
 def faulty(draw):
     """A log to which sensors, cables, loggers or hands have done one to three things."""
     signals = {name: getattr(log(), name).copy() for name in SIGNALS}
     for _ in range(draw(st.integers(1, 3))):
-        name = draw(st.sampled_from(SIGNALS))
+        name = draw(sampled(SIGNALS))
         signal = np.atleast_2d(signals[name])
         axes = draw(st.permutations(range(len(signal))))[: draw(st.integers(1, len(signal)))]
         at = draw(rows(signal.shape[1]))
         part, spread = np.ix_(axes, at), np.nanstd(signal)
         match draw(
-            st.sampled_from(
-                ("value", "value", "factor", "offset", "shift", "noise", "held", "swapped", "lost", "twice", "clipped")
-            )
+            sampled(("value", "value", "factor", "offset", "shift", "noise", "held", "swapped", "lost", "twice", "clipped"))
         ):
             case "value":
-                signal[part] = draw(st.sampled_from(FLOATS))
+                signal[part] = draw(sampled(FLOATS))
             case "factor":
-                signal[part] *= draw(st.sampled_from(FACTORS))
+                signal[part] *= draw(sampled(FACTORS))
             case "offset":
-                signal[part] += draw(st.sampled_from(FLOATS))
+                signal[part] += draw(sampled(FLOATS))
             case "shift":
                 signal[part] += spread * draw(st.floats(-3, 3))
             case "noise":
@@ -94,10 +92,9 @@ def faulty(draw):
 
 
 @cases
-@given(data=st.data(), fitted=st.sampled_from((*[False] * 9, True)))
+@given(data=st.data(), fitted=sampled((*[False] * 9, True)))
 def test_rows(data, fitted):
-    with np.errstate(all="ignore"):
-        signals = data.draw(faulty())
+    signals = data.draw(faulty())
     with watched("log"):
         found = checked_trial("log", replace(log(), **signals), RIG)
         assert np.isfinite(found.openings).all()

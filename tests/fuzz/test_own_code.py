@@ -1,11 +1,10 @@
 """Python files with a controller of a user's own, whole and damaged: whatever they raise is one line."""
 
 from hypothesis import given
-from hypothesis import strategies as st
 
 from baselines.named import make_controller
 from birthsim_env import Parameters
-from tests.fuzz.strategies import damaged
+from tests.fuzz.strategies import damaged, sampled
 from tests.fuzz.watched import cases, watched
 
 CLASS = "class Own:\n    def __init__(self, rig): "
@@ -16,7 +15,7 @@ SOURCES = (
     *("raise RuntimeError('at import')\n", "raise SystemExit(3)\n", "import sys\nsys.exit()\n", "raise KeyError\n"),
     *("raise ValueError('a\\nb')\n", "raise GeneratorExit\n", "raise MemoryError\n", "def f(): f()\nf()\n", "x = 1 / 0\n"),
     *("x = " + "(" * 500 + ")" * 500, "x = " + "9" * 5000 + "\n", "# coding: latin-99\nOwn = 1\n"),
-    *("class Own: pass\n", "Own = 3\n", "Own = None\n", "def Own(*a): return None\n"),
+    *("class Own: pass\n", "class Own(Exception): pass\n", "Own = 3\n", "Own = None\n", "def Own(*a): return None\n"),
     "class Own(Exception): pass\nraise Own('ö' * 5000)\n",
     *(
         f"{CLASS}raise SystemExit(1)\n",
@@ -24,7 +23,7 @@ SOURCES = (
         f"{CLASS}raise ValueError('a\\nb' * 2000)\n",
     ),
 )
-TEXTS = st.sampled_from([text.encode() for text in SOURCES])
+TEXTS = sampled([text.encode() for text in SOURCES])
 
 
 @cases

@@ -19,23 +19,23 @@ from agents.training.configuration import TrainingSettings
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.algorithms import make_model
 from agents.training.sb3.checkpoint import load_checkpoint, save_checkpoint
-from tests.fuzz.strategies import altered, damaged, json_texts, odd_arrays
+from tests.fuzz.strategies import altered, composite, damaged, json_texts, odd_arrays, sampled
 from tests.fuzz.watched import cases, watched
 
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"law": {"pooled_mm": 2.5}, "policy": None, "curve": [{"steps": 0, "x": 0.1}]}
 TINY = TrainingSettings("BirthSIM/ProbeResidual-v2", steps=64, lanes=2, rollout=16, batch=32, hidden=(8, 8))
 
 
-@st.composite
+@composite
 def odd_seals(draw, content, form):
     """Another content of a sealed file."""
-    match draw(st.sampled_from(("damaged", "header", "arrays", "values", "both"))):
+    match draw(sampled(("damaged", "header", "arrays", "values", "both"))):
         case "damaged":
             return draw(damaged(content))
         case "header":
             size = int.from_bytes(content[:8], "little")
             header = draw(json_texts(json.loads(content[8 : 8 + size])))
-            length = draw(st.just(len(header)) | st.sampled_from((0, 1, 2**63, 2**64 - 1, len(header) + 1)))
+            length = draw(sampled([len(header)]) | sampled((0, 1, 2**63, 2**64 - 1, len(header) + 1)))
             return length.to_bytes(8, "little") + header + content[8 + size :]
         case what:
             arrays, about = unsealed(content, form)

@@ -19,7 +19,7 @@ from birthsim_env import Parameters
 from birthsim_env.parts.courses import check_points
 from birthsim_env.parts.own_parts import hand_of, trajectory_of
 from birthsim_env.parts.times import called, check_times
-from tests.fuzz.strategies import altered, damaged, json_texts, plain
+from tests.fuzz.strategies import altered, composite, damaged, json_texts, plain, sampled
 from tests.fuzz.watched import cases, watched
 
 ROWS = 30
@@ -41,63 +41,63 @@ GOOD = {name: np.random.default_rng(k).uniform(-1, 1, ROWS).tolist() for k, name
 GOOD["time"] = [1e-3 * row for row in range(ROWS)]
 
 
-@st.composite
+@composite
 def columns(draw):
     """Columns of a log, of which up to three are odd, gone or in another place."""
     values = {name: list(column) for name, column in GOOD.items()}
     for _ in range(draw(st.integers(0, 3))):
-        name = draw(st.sampled_from(list(values)))
+        name = draw(sampled(list(values)))
         column = values.pop(name)
-        match draw(st.sampled_from(("heading", "cell", "column", "gone"))):
+        match draw(sampled(("heading", "cell", "column", "gone"))):
             case "heading":
-                values[draw(st.sampled_from(HEADINGS))] = column
+                values[draw(sampled(HEADINGS))] = column
             case "cell":
-                column[draw(st.integers(0, ROWS - 1))] = draw(st.sampled_from(CELLS))
+                column[draw(st.integers(0, ROWS - 1))] = draw(sampled(CELLS))
                 values[name] = column
             case "column":
-                values[name] = [draw(st.sampled_from(CELLS))] * ROWS
+                values[name] = [draw(sampled(CELLS))] * ROWS
     return values
 
 
-@st.composite
+@composite
 def texts(draw, values):
-    separator = draw(st.sampled_from((",", ",", ";", "\t", " ", "|")))
+    separator = draw(sampled((",", ",", ";", "\t", " ", "|")))
     lines = [separator.join(values), *(separator.join(map(str, row)) for row in zip(*values.values(), strict=True))]
     if draw(st.integers(0, 4)) == 0:
         line = draw(st.integers(0, len(lines) - 1))
         lines[line] = lines[line][: draw(st.integers(0, len(lines[line])))] + str(draw(plain))[:500]
-    end = draw(st.sampled_from(("\n", "\n", "\r\n", "\r", separator + "\n")))
-    text = draw(st.sampled_from(BLOCKS)) + end.join(lines)
-    return text.encode(draw(st.sampled_from(ENCODINGS)), "replace")
+    end = draw(sampled(("\n", "\n", "\r\n", "\r", separator + "\n")))
+    text = draw(sampled(BLOCKS)) + end.join(lines)
+    return text.encode(draw(sampled(ENCODINGS)), "replace")
 
 
 KINDS = (pa.float64(), pa.string(), pa.float32(), pa.timestamp("ms"), pa.decimal128(38, 6), pa.int64())
 
 
-@st.composite
+@composite
 def parquets(draw, values):
     arrays = {}
     for name, column in values.items():
         arrays[name] = pa.array(list(map(str, column)))
         with contextlib.suppress(pa.ArrowException):
-            kind = draw(st.sampled_from((*[KINDS[0]] * 20, *KINDS)))
+            kind = draw(sampled((*[KINDS[0]] * 20, *KINDS)))
             arrays[name] = pa.array(column if any(isinstance(one, str) for one in column) else list(map(float, column)))
             arrays[name] = arrays[name].cast(kind, safe=False)
     if draw(st.booleans()):
         arrays["force"] = pa.array([{"x": 1.0, "y": None}, None] * (ROWS // 2))
         arrays["many"] = pa.array([[1.0]] * ROWS)
     content = io.BytesIO()
-    pq.write_table(pa.table(arrays), content, compression=draw(st.sampled_from(("none", "snappy", "zstd", "gzip"))))
+    pq.write_table(pa.table(arrays), content, compression=draw(sampled(("none", "snappy", "zstd", "gzip"))))
     return content.getvalue()
 
 
-@st.composite
+@composite
 def mcaps(draw, values):
     content = io.BytesIO()
-    writer = Writer(content, compression=draw(st.sampled_from(list(CompressionType))))
+    writer = Writer(content, compression=draw(sampled(list(CompressionType))))
     writer.start()
     schema = writer.register_schema("log", "jsonschema", b"{}")
-    encodings = ("json", draw(st.sampled_from(("json", "json", "json", "ros1"))))
+    encodings = ("json", draw(sampled(("json", "json", "json", "ros1"))))
     channels = [writer.register_channel(f"/{k}", encoding, schema) for k, encoding in enumerate(encodings)]
     odd, other = draw(st.integers(0, 3 * ROWS)), draw(st.integers(0, 3 * ROWS))
     for row, one in enumerate(zip(*values.values(), strict=True)):
@@ -111,16 +111,16 @@ def mcaps(draw, values):
     return content.getvalue()
 
 
-@st.composite
+@composite
 def matlabs(draw, values):
     variables = {}
     for place, (name, column) in enumerate(values.items()):
         known = name.isidentifier() and name.isascii() and len(name) < 31 and not name.startswith("_")
         array = np.array(column, dtype=object if any(isinstance(one, str) for one in column) else float)
         variables[name if known else f"odd{place}"] = array
-    match draw(st.sampled_from(("", "", "short", "structure", "array", "more"))):
+    match draw(sampled(("", "", "short", "structure", "array", "more"))):
         case "short":
-            name = draw(st.sampled_from(list(variables)))
+            name = draw(sampled(list(variables)))
             variables[name] = variables[name][: draw(st.integers(0, ROWS - 1))]
         case "structure":
             variables = {"log": variables}
@@ -142,10 +142,10 @@ FORMS = {**dict.fromkeys((".csv", ".CSV", ".txt"), texts), ".parquet": parquets,
 @given(data=st.data())
 def test_a_log(form, data):
     content = data.draw(columns().flatmap(FORMS[form]))
-    content = data.draw(st.just(content) | st.just(content) | damaged(content))
+    content = data.draw(sampled([content]) | sampled([content]) | damaged(content))
     options = LogOptions(
-        data.draw(st.sampled_from(MAPPED)),
-        data.draw(st.sampled_from((*[None] * 9, 0, 3, 10**9))),
+        data.draw(sampled(MAPPED)),
+        data.draw(sampled((*[None] * 9, 0, 3, 10**9))),
         data.draw(st.integers(0, 9)) == 9,
     )
     with warnings.catch_warnings(), watched(f"ours{form}", "--columns", memory=2**30) as case:
@@ -157,7 +157,7 @@ def test_a_log(form, data):
         assert len({len(values) for values in found.values()}) == 1
 
 
-@st.composite
+@composite
 def courses(draw):
     """A CSV file of points or forces over time, of which some cells are odd."""
     times = 0.1 * np.arange(draw(st.integers(1, 39)))
@@ -165,10 +165,10 @@ def courses(draw):
     for _ in range(draw(st.integers(0, 3))):
         line = draw(st.integers(0, len(lines) - 1))
         cells = lines[line].split(",")
-        cells[draw(st.integers(0, len(cells) - 1))] = str(draw(plain | st.just("9" * 5000)))
+        cells[draw(st.integers(0, len(cells) - 1))] = str(draw(plain | sampled(["9" * 5000])))
         lines[line] = ",".join(cells[: draw(st.integers(1, 4))])
     text = "\n".join(lines).encode()
-    return draw(st.just(text) | damaged(text))
+    return draw(sampled([text]) | damaged(text))
 
 
 @pytest.mark.parametrize("part", ["reference", "user_force"])

@@ -1,6 +1,8 @@
 """The checker itself sees every misbehaviour, and its own damage damages."""
 
 import os
+import sys
+from importlib import import_module
 from itertools import repeat
 
 import numpy as np
@@ -49,6 +51,16 @@ def test_what_works_and_what_is_refused_clearly_pass():
     with watched("argument") as example:
         raise CLEAR
     assert example.refused == str(CLEAR)
+
+
+def test_a_module_may_be_imported_for_the_first_time(tmp_path, monkeypatch):
+    """In a new clone no module is compiled; which of a lot of examples imports it first, chance decides."""
+    (tmp_path / "late_module.py").write_text("X = 1\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    with watched("argument", runs_code=True):
+        assert import_module("late_module").X == 1
+    assert list((tmp_path / "__pycache__").glob("late_module*"))
 
 
 def test_any_value_is_shown_in_a_short_line():

@@ -69,7 +69,7 @@ def watched(*names, runs_code=False, memory=MEMORY):
         except (ValueError, TypeError) as error:
             example.refused, fault = str(error), unclear(error, example.names)
         assert not fault, f"{fault}: {example.refused[:3000]}"
-        assert example.deeds == []
+        assert not example.deeds, example.deeds
 
 
 def unclear(error, names):
@@ -140,5 +140,5 @@ def _deed(event, arguments, example):
 
 
 def _is_own(path, example):
-    """Whether a path is in the example's folder, or in the cache of compiled kernels."""
-    return str(path).startswith((str(example.folder), os.devnull, str(cache_folder())))
+    """Whether a path is in the example's folder, or in a cache: of compiled kernels, or of modules that are imported late."""
+    return "__pycache__" in str(path) or str(path).startswith((str(example.folder), os.devnull, str(cache_folder())))

@@ -68,16 +68,20 @@ def endless(x: Array, out: Array, n: int) -> None:
             out[0, i] += x[0, i]
 
 
-def gradient(function: Any, x: Array, weights: Array) -> Array:
-    """Gradient of the sum of weights times what a helper writes, by the code that is generated for it."""
-    graph, out = Graph(), empty(len(weights))
-    block = inputs(graph, "a", len(x))
+def generated(function: Any, rows: int, count: int) -> str:
+    """A module with the gradient of what a helper writes to ``count`` rows."""
+    graph, out = Graph(), empty(count)
+    block = inputs(graph, "a", rows)
     call(function, block, out, 1)
     pairs = [(value, graph.input("b", k)) for k, value in enumerate(out[:, 0])]
-    bars = reverse(graph, pairs, [graph.input("a", row) for row in range(len(x))])
-    text = source.HEAD + source.loop(graph, "back", ("a", "b", "o"), [("o", k, bar) for k, bar in enumerate(bars)])
+    bars = reverse(graph, pairs, [graph.input("a", row) for row in range(rows)])
+    return source.HEAD + source.loop(graph, "back", ("a", "b", "o"), [("o", k, bar) for k, bar in enumerate(bars)])
+
+
+def gradient(function: Any, x: Array, weights: Array) -> Array:
+    """Gradient of the sum of weights times what a helper writes, by the code that is generated for it."""
     found = np.empty_like(x)
-    source.module_of(text).back(x, weights, found, x.shape[1])
+    source.module_of(generated(function, len(x), len(weights))).back(x, weights, found, x.shape[1])
     return found
 
 
@@ -117,6 +121,21 @@ def test_gradients_of_a_helper_are_differences(name: str) -> None:
     assert np.isfinite(found[first:]).all()
     got = np.where(way == 0.0, 0.0, found * way).sum(axis=0)
     np.testing.assert_allclose(got, (total(1e-5) - total(-1e-5)) / 2e-5, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_generated_code_has_the_bits_of_python(name: str) -> None:
+    """Its statements become instructions one by one, without Numba's analysis."""
+    function, x, count, _ = CASES[name]
+    weights = np.random.default_rng(2).standard_normal((count, LANES))
+    names: dict[str, Any] = {}
+    text = generated(function, len(x), count).replace("@straight", "").replace("@helper", "")
+    exec(text, names)
+    names["choose"] = lambda condition, yes, no: yes if condition else no
+    expected = np.empty_like(x)
+    with np.errstate(all="ignore"):
+        names["back"](x, weights, expected, LANES)
+    np.testing.assert_array_equal(gradient(function, x, weights), expected)
 
 
 def test_a_loop_of_any_length_is_refused() -> None:

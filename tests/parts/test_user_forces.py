@@ -90,7 +90,7 @@ def test_forceps_pulls_are_ramped_held_and_released(kind, seed, sizes, rates):
 
 def tops_of(scenario, kind="nominal", seed=0):
     """N. What is held of each pull; at the end nothing is left."""
-    times, rows = course(getattr(find_scenario(scenario), kind)()[1], find_scenario(scenario).duration, seed)
+    times, rows = course(getattr(find_scenario(scenario), kind)()[1], find_scenario(scenario).duration, seed, step=0.01)
     size = np.hypot(*rows.T)
     assert size[-1] == 0.0
     return [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from birthsim_env.extras import installation
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import checked
+from birthsim_env.physics.rig.arrays import shape_of
 
 
 class Signal(NamedTuple):
@@ -94,7 +95,7 @@ class LinearModel:
 
     def frequency_response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """C (jw - A)^-1 B + D at frequencies (F,), Hz above zero: complex, (F, outputs, inputs)."""
-        given = checked("frequency", frequency, (len(frequency) if np.iterable(frequency) else 1,), "Hz")
+        given = checked("frequency", frequency, (*shape_of(frequency), 1)[:1], "Hz")
         if not np.all(given > 0):
             raise ValueError(f"frequency = {given[~(given > 0)][0]:g}; allowed: above 0 (Hz)")
         s = 2j * np.pi * given[:, None, None]

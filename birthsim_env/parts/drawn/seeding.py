@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from birthsim_env.physics.rig.values import checked_range, shown, whole_of
+from birthsim_env.physics.rig.values import checked_range, length_of, shown, whole_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,12 +27,13 @@ def lane_seeds(seed: int | list[int | None] | None, num_envs: int, generator: np
         if first < 0:
             raise ValueError(f"seed = {shown(seed)}; allowed: None or a whole number >= 0")
         return [first + i for i in range(num_envs)]
-    listed = seed.tolist() if isinstance(seed, np.ndarray) else seed
-    if listed is not None and (isinstance(listed, (str, bytes)) or not isinstance(listed, Sequence)):
-        raise ValueError(f"seed = {shown(seed)}; allowed: None, an integer, or one entry for each of {num_envs} lanes")
-    given: list[int | None] = [None] * num_envs if listed is None else list(listed)
-    if len(given) != num_envs:
-        raise ValueError(f"seed has {len(given)} entries; allowed: None, an integer, or one entry for each of {num_envs} lanes")
+    allowed = f"allowed: None, an integer, or one entry for each of {num_envs} lanes"
+    listed = seed.ndim == 1 if isinstance(seed, np.ndarray) else isinstance(seed, Sequence)
+    if seed is not None and (isinstance(seed, (str, bytes)) or not listed):
+        raise ValueError(f"seed = {shown(seed)}; {allowed}")
+    if seed is not None and length_of(seed) != num_envs:
+        raise ValueError(f"seed has {length_of(seed):g} entries; {allowed}")
+    given: list[int | None] = [None] * num_envs if seed is None else list(seed)  # type: ignore[arg-type]
     for lane, s in enumerate(given):
         number = 0 if s is None else whole_of(s)
         if number is None or number < 0:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import llvmlite
+import llvmlite.binding
 import numba
 from numba.core import event, serialize
 from numba.core.caching import NullCache
@@ -86,6 +87,9 @@ class _Announcer(event.Listener):
     def on_end(self, event: Any) -> None:
         pass
 
+
+# LLVM finds that nothing else points into a block of scratch only if it may look at all uses of the block: one for every row.
+llvmlite.binding.set_option("birthsim", "-capture-tracking-max-uses-to-explore=2000")
 
 event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.rows import RIG_ROWS, rows_of
+from birthsim_env.physics.rig.values import length_of, shown
 
 Array = NDArray[np.float64]
 
@@ -69,11 +70,11 @@ def parameter_array(parameters: Parameters | Sequence[Parameters], num_lanes: in
     """Parameters of all lanes, (PARAMETERS, num_lanes): one rig for all, or a sequence with one per lane."""
     if isinstance(parameters, Parameters):
         return parameter_columns(parameters, num_lanes)
-    if len(parameters) != num_lanes:
+    if length_of(parameters) != num_lanes:
         raise ValueError(
-            f"parameters has {len(parameters)} entries; allowed: one Parameters, or one for each of {num_lanes} lanes"
+            f"parameters has {length_of(parameters):g} entries; allowed: one Parameters, or one for each of {num_lanes} lanes"
         )
     for lane, rig in enumerate(parameters):
         if not isinstance(rig, Parameters):
-            raise ValueError(f"parameters[{lane}] = {rig!r}; allowed: a Parameters")
+            raise ValueError(f"parameters[{lane}] = {shown(rig)}; allowed: a Parameters")
     return np.stack([parameter_column(p) for p in parameters], axis=1)

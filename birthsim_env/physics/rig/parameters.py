@@ -129,16 +129,20 @@ class Parameters:
     @classmethod
     def from_dict(cls, sections: dict[str, Any]) -> Self:
         """Inverse of ``to_dict``; ``"mechanics.mass"`` may name a value too. What is not named keeps its default."""
+        if not isinstance(sections, Mapping):
+            raise ValueError(f"sections = {shown(sections)}; allowed: a mapping such as {{'mechanics': {{'mass': 4.0}}}}")
         changes = {}
         for section, values in sections.items():
-            if "." in section:
+            if isinstance(section, str) and "." in section:
                 changes[section] = values
-            elif not isinstance(values, dict):
+            elif not isinstance(values, Mapping):
                 raise ValueError(
-                    f"{in_line(section)} = {shown(values)}; allowed: a section, one of {', '.join(SECTIONS)}, {RANDOMIZE}"
+                    f"{_word(section)} = {shown(values)}; allowed: a section, one of {', '.join(SECTIONS)}, {RANDOMIZE}"
                 )
+            elif section not in (*SECTIONS, RANDOMIZE):
+                parameter_of(section)
             elif section != RANDOMIZE:
-                changes.update({f"{section}.{name}": value for name, value in values.items()})
+                changes.update({f"{section}.{_word(name)}": value for name, value in values.items()})
         return dataclasses.replace(cls().replace(changes), ranges=_own_ranges(sections.get(RANDOMIZE, {})))
 
     def to_toml(self, path: str | os.PathLike[str]) -> None:
@@ -155,14 +159,19 @@ class Parameters:
             raise ValueError(f"parameters = {str(path)!r}: {error}") from error
 
 
-def _own_ranges(table: dict[str, Any]) -> tuple[tuple[str, float, float], ...]:
+def _word(key: Any) -> str:
+    """A key of a mapping in a line; of what is no text, how Python writes it."""
+    return in_line(key) if isinstance(key, str) else shown(key)
+
+
+def _own_ranges(table: Mapping[Any, Any]) -> tuple[tuple[str, float, float], ...]:
     """The table ``[randomize]`` of a file; names and limits are checked where they are drawn from."""
     found = []
     for name, bounds in table.items():
-        if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
-            words = f"[{RANDOMIZE}] {in_line(name)} = {shown(bounds)}"
-            raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
         parameter_of(name)
+        if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
+            words = f"[{RANDOMIZE}] {name} = {shown(bounds)}"
+            raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
         found.append((name, float(bounds[0]), float(bounds[1])))
     return tuple(sorted(found))
 
@@ -179,10 +188,12 @@ DECLARED = {f"{section}.{name}": one for section, part in SECTIONS.items() for n
 
 def parameter_of(dotted: str) -> Parameter:
     """What is declared of a dotted name such as ``"mechanics.mass"``; ``ValueError`` names the alternatives."""
-    section, _, name = dotted.partition(".") if isinstance(dotted, str) else (dotted, "", "")
+    if not isinstance(dotted, str):
+        raise ValueError(f"unknown parameter {shown(dotted)}; allowed: dotted names such as 'mechanics.mass'")
+    section, _, name = dotted.partition(".")
     if section not in SECTIONS:
         like = [f"{one}.{dotted}" for one, part in SECTIONS.items() if dotted in part.parameters]
-        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else near(str(section), SECTIONS)
+        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else near(section, SECTIONS)
         raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(SECTIONS)}")
     known = SECTIONS[section].parameters
     if name not in known:

@@ -85,6 +85,14 @@ def make_plain(record: Any) -> None:
         object.__setattr__(record, field.name, plain(getattr(record, field.name)))
 
 
+def length_of(value: Any) -> float:
+    """How many entries a sequence says to have, more than which nobody lists: a range may have more than ``len`` can count."""
+    try:
+        return len(value)
+    except OverflowError:
+        return math.inf
+
+
 def path_of(value: Any) -> str | None:
     """``value`` as the text of a path where it is text or an ``os.PathLike``, else None."""
     try:
