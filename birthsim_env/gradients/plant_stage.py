@@ -35,7 +35,7 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     given, weighs, result, p = block(tape, INPUTS), block(bars, INPUTS), block(out, INPUTS), scratch(PARAMETERS)
     points = carray(pointer(out + 8 * BLOCK * INPUTS, np.float64), (STAGES * steps, STATES, BLOCK))
     g, late = scratch(STATES), scratch(STATES)
-    x, dx, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES), scratch(STATES)
+    x, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES)
     u, f, by, total = scratch(4), scratch(2), scratch(INPUTS), scratch(INPUTS)
     dynamics.load(block(rig, PARAMETERS), 0, n, p)
     total[:STATES], by[:] = 0.0, 0.0
@@ -44,7 +44,7 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     dynamics.copy(given, points[BEGINNING], n)
     dynamics.copy(given[STATES:], u, n)
     dynamics.copy(given[PUSHED:], f, n)
-    lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
+    lay_out(points, u, f, p, steps, step, x, sums, trial, n)
     back_over(adjoint, points, u, f, p, steps, step, late, x, g, by, total, n)
     dynamics.settle(late, n)
     dynamics.copy(late, total[:STATES], n)

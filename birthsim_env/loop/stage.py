@@ -22,15 +22,14 @@ from birthsim_env.physics.compiled.compilation import Late, helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.compiled.records import Rows
+from birthsim_env.physics.compiled.stack import scratch
 
 if TYPE_CHECKING:
-    from birthsim_env.loop.machine import call, carray, pointer, scratch
+    from birthsim_env.loop.machine import call, carray, pointer
 elif DEBUG:
-    from birthsim_env.loop.plain import call, carray, pointer, scratch
+    from birthsim_env.loop.plain import call, carray, pointer
 else:
-    call, carray, pointer, scratch = (
-        Late("birthsim_env.loop.machine", name) for name in ("call", "carray", "pointer", "scratch")
-    )
+    call, carray, pointer = (Late("birthsim_env.loop.machine", name) for name in ("call", "carray", "pointer"))
 
 __all__ = ["call", "carray", "pointer", "scratch"]
 

@@ -9,6 +9,7 @@ import ast
 import contextlib
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
@@ -38,7 +39,7 @@ class Source(NamedTuple):
 def file_of(module: str) -> Path | None:
     """The source file of one of this project's modules, or None."""
     place = ROOT.joinpath(*module.split("."))
-    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file())
+    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if os.path.isfile(path))
     return next(found, None) if is_ours(module) else None
 
 

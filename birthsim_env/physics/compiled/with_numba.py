@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite
+import llvmlite.binding
 import numba
 from numba.core import event, serialize, types
 from numba.core.caching import NullCache
@@ -23,7 +24,7 @@ from numba.core.compiler import Compiler, CompileResult
 from numba.core.registry import CPUDispatcher, cpu_target
 
 import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
-from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK, WARP
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.record_types import block_type
 from birthsim_env.physics.compiled.sources import is_ours, stamp_of
@@ -40,7 +41,7 @@ class _DiskCache(NullCache):
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
-        how = (BLOCK, *(os.environ.get(f"NUMBA_{kind}_VECTORIZE") for kind in ("LOOP", "SLP")))
+        how = (BLOCK, WARP, *(os.environ.get(f"NUMBA_{kind}_VECTORIZE") for kind in ("LOOP", "SLP")))
         kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions, how)).encode()).hexdigest()
         return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
 
@@ -69,6 +70,9 @@ class _Announcer(event.Listener):
     def on_end(self, event: Any) -> None:
         pass
 
+
+# LLVM finds that nothing else points into a block of scratch only if it may look at all uses of the block: one for every row.
+llvmlite.binding.set_option("birthsim", "-capture-tracking-max-uses-to-explore=2000")
 
 event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 
