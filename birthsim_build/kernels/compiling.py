@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
@@ -31,7 +32,7 @@ def objects_of(kernel: Any, kinds: Sequence[str], symbol: str, libraries: Sequen
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def _numbas_code(kernel: Any, kinds: Sequence[str]) -> tuple[str, str, tuple[Any, ...], str]:
     """Symbol and code of what Numba makes, not optimised; with the types of its arguments and the kind of its result."""
-    _leave_functions_alone()
+    _set_up()
     arguments = types_of(kernel, kinds)
     # As a helper its code is that of all it calls, and is not optimised.
     inlined = with_numba.helper(kernel.py_func)
@@ -42,8 +43,9 @@ def _numbas_code(kernel: Any, kinds: Sequence[str]) -> tuple[str, str, tuple[Any
 
 
 @cache
-def _leave_functions_alone() -> None:
-    """Numba optimises functions for the processor that it runs on as it adds them."""
+def _set_up() -> None:
+    """Numba optimises functions for the processor that it runs on as it adds them; and it tells users to wait."""
+    event.unregister("numba:compile", with_numba.ANNOUNCER)  # type: ignore[no-untyped-call]
     codegen = cpu_target.target_context.codegen()
     builder = codegen._pass_builder()
     codegen._function_pass_manager = lambda: (llvm.create_new_function_pass_manager(), builder)

@@ -10,6 +10,7 @@ import os
 import runpy
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -28,21 +29,30 @@ def record(paths: Iterable[str], library: Path, work: Path) -> tuple[list[str], 
     """Keys of the kernels that ``paths`` ask for, and the sources of the modules that they generate."""
     keys, texts = set[str](), set[str]()
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        for found in pool.map(lambda name: _walked(name, library, make_folder(work / name)), paths):
+        for found in pool.map(lambda name: _walked(name, library, _kept(work / name)), paths):
             keys |= set(found["keys"])
             texts |= set(found["texts"])
     return sorted(keys), sorted(texts)
 
 
-def _walked(name: str, library: Path, folder: Path) -> dict[str, list[str]]:
+def _walked(name: str, library: Path, kept: Path) -> dict[str, list[str]]:
     own = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "BIRTHSIM_"))}
-    environment = {**own, LIBRARY: str(library), "NUMBA_CACHE_DIR": str(make_folder(folder.parent / "compiled"))}
-    line = [sys.executable, "-m", __name__, name, str(folder)]
-    done = subprocess.run(line, capture_output=True, text=True, errors="replace", env=environment)
-    if done.returncode:
-        raise RuntimeError(f"the path {name} ends with {done.returncode}: {done.stderr.strip()[-2000:]}")
-    found: dict[str, list[str]] = json.loads((folder / "asked.json").read_text(encoding="utf-8"))
+    environment = {**own, LIBRARY: str(library), "NUMBA_CACHE_DIR": str(kept)}
+    with tempfile.TemporaryDirectory() as folder:
+        line = [sys.executable, "-m", __name__, name, folder]
+        done = subprocess.run(line, capture_output=True, text=True, errors="replace", env=environment)
+        if done.returncode:
+            raise RuntimeError(f"the path {name} ends with {done.returncode}: {done.stderr.strip()[-2000:]}")
+        found: dict[str, list[str]] = json.loads((Path(folder) / "asked.json").read_text(encoding="utf-8"))
     return found
+
+
+def _kept(folder: Path) -> Path:
+    """The folder of what a path keeps, with machine code alone: for what else is kept it would ask no more."""
+    for path in make_folder(folder).iterdir():
+        if path.is_file() and path.suffix != ".nbc":
+            path.unlink()
+    return folder
 
 
 def main(name: str, folder: Path) -> None:

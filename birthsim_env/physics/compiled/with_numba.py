@@ -74,7 +74,8 @@ class _Announcer(event.Listener):
 # LLVM finds that nothing else points into a block of scratch only if it may look at all uses of the block: one for every row.
 llvmlite.binding.set_option("birthsim", "-capture-tracking-max-uses-to-explore=2000")
 
-event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
+ANNOUNCER = _Announcer()
+event.register("numba:compile", ANNOUNCER)  # type: ignore[no-untyped-call]
 
 
 def kernel(function: Callable[..., Any]) -> Any:

@@ -12,6 +12,7 @@ from birthsim_build.code.elf import undefined_in
 from birthsim_build.kernels.__main__ import ENVIRONMENT
 from birthsim_build.kernels.kinds import result_of, types_of
 from birthsim_build.kernels.libraries import LIBRARIES, SHIPPED
+from birthsim_build.kernels.recording import record
 from birthsim_env.physics.compiled import prebuilt
 from tests.build.kernels import own
 from tests.build.targets import need_linker
@@ -59,6 +60,16 @@ def test_a_build_that_compiles_nothing_has_the_same_bytes(built):
     kept = {path: path.stat().st_mtime_ns for path in (folder / "work" / "objects").iterdir()}
     assert build(folder / "again", folder / "work") == built[1]
     assert {path: path.stat().st_mtime_ns for path in (folder / "work" / "objects").iterdir()} == kept
+
+
+@pytest.mark.slow
+def test_a_path_asks_for_the_same_again(built, tmp_path):
+    """What it has left, a policy and derivatives that were traced, would ask for less."""
+    names, library = ["physics", "train by gradients"], built[0]
+    first, second = (record(names, library, tmp_path / "work") for _ in range(2))
+    assert first == second
+    asked = {key.partition(" ")[0].rpartition(".")[2] for key in first[0]}
+    assert {"_directions", "_answer", "_forward", "_backward", "adjoint"} <= asked
 
 
 @pytest.mark.slow
