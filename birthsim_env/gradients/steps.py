@@ -12,7 +12,8 @@ from birthsim_env.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of

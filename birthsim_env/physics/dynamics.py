@@ -9,8 +9,10 @@ import math
 
 from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK, WARP
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.shared import anew
 from birthsim_env.physics.compiled.stack import column, scratch
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
@@ -272,10 +274,14 @@ def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, i
     copy(x, trial, n)
     for _ in range(steps):
         for k in range(STAGES):
-            if k < STAGES - 1:
-                stage(before, u, f, p, total, trial, n, weight_of(k, step), ahead_of(k, step))
+            own = anew(p)
+            if k < STAGES - 1 or WARP:
+                stage(before, u, f, own, total, trial, n, weight_of(k, step), ahead_of(k, step))
             else:
-                last_stage(before, u, f, p, total, trial, n, weight_of(k, step))
+                last_stage(before, u, f, own, total, trial, n, weight_of(k, step))
+        if WARP:  # with one right-hand side, since two of them are too long for a thread's instructions to stay at hand
+            copy(total, before, n)
+            copy(total, trial, n)
         record_impacts(total, p, impacts, n)
     copy(total, x, n)
 
