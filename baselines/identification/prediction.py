@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from baselines.identification.windows import Windows, admitted_openings, spools_at
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.dynamics import integrate, load, settle, steps_in, store
 from birthsim_env.physics.geometry import end_effector_motion
@@ -59,8 +60,7 @@ def _track(
     """Moves ``state`` (18, N) by K periods of a ``clock``, under openings (4, T) and forces (2, T) from
     ``rows`` (N,) on; writes pressures and position of the end effector at every period, ``tracks`` (K + 1, 6, N)."""
     x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx, hit = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK)), np.zeros((2, BLOCK))
-    total, trial, motion = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK))
+    p, hit, motion = np.empty((at.PARAMETERS, BLOCK)), np.zeros((2, BLOCK)), np.empty((4, BLOCK))
     periods, steps = tracks.shape[0] - 1, int(clock.steps)
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
@@ -80,7 +80,7 @@ def _track(
                         u[valve, i] = openings[valve, row]
                     for axis in range(2):
                         f[axis, i] = forces[axis, row]
-                integrate(x, u, f, p, steps, clock.period / steps, hit, dx, total, trial, n)
+                integrate(x, u, f, p, steps, clock.period / steps, hit, n)
                 settle(x, n)
         store(x, first, n, state)
 

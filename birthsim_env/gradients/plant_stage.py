@@ -15,7 +15,8 @@ from birthsim_env.loop.rows import FORCE, MOTION, OPENING, STATE, WORLD
 from birthsim_env.loop.stage import Stage, block, carray, pointer, scratch
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.runge_kutta import STAGES
@@ -34,7 +35,7 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     given, weighs, result, p = block(tape, INPUTS), block(bars, INPUTS), block(out, INPUTS), scratch(PARAMETERS)
     points = carray(pointer(out + 8 * BLOCK * INPUTS, np.float64), (STAGES * steps, STATES, BLOCK))
     g, late = scratch(STATES), scratch(STATES)
-    x, dx, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES), scratch(STATES)
+    x, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES)
     u, f, by, total = scratch(4), scratch(2), scratch(INPUTS), scratch(INPUTS)
     dynamics.load(block(rig, PARAMETERS), 0, n, p)
     total[:STATES], by[:] = 0.0, 0.0
@@ -43,7 +44,7 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
     dynamics.copy(given, points[BEGINNING], n)
     dynamics.copy(given[STATES:], u, n)
     dynamics.copy(given[PUSHED:], f, n)
-    lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
+    lay_out(points, u, f, p, steps, step, x, sums, trial, n)
     back_over(adjoint, points, u, f, p, steps, step, late, x, g, by, total, n)
     dynamics.settle(late, n)
     dynamics.copy(late, total[:STATES], n)

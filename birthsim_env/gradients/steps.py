@@ -12,7 +12,8 @@ from birthsim_env.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
@@ -29,7 +30,6 @@ def lay_out(
     steps: int,
     step: float,
     x: Array,
-    dx: Array,
     total: Array,
     trial: Array,
     n: int,
@@ -41,8 +41,7 @@ def lay_out(
             dynamics.copy(points[k], x, n)
             dynamics.copy(x, total, n)
             dynamics.copy(x, trial, n)
-        dynamics.right_hand_side(trial, u, f, p, dx, n)
-        dynamics.stage(x, dx, total, trial, n, weight_of(stage, step), ahead_of(stage, step))
+        dynamics.stage(x, u, f, p, total, trial, n, weight_of(stage, step), ahead_of(stage, step))
         dynamics.copy(total if stage == STAGES - 1 else trial, points[k + 1], n)
 
 
@@ -108,8 +107,7 @@ def advance(
 ) -> None:
     """``dynamics.advance``, which keeps the state before every step in ``tape`` (blocks, K steps, 18, BLOCK)."""
     x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
-    total, trial, hit = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((2, BLOCK))
+    p, hit = np.empty((at.PARAMETERS, BLOCK)), np.empty((2, BLOCK))
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
         load(state, first, n, x)
@@ -119,7 +117,7 @@ def advance(
         for k in range(tape.shape[1]):
             load(forces[k // steps], first, n, f)
             store(x, 0, n, tape[first // BLOCK, k])
-            dynamics.integrate(x, u, f, p, 1, step, hit, dx, total, trial, n)
+            dynamics.integrate(x, u, f, p, 1, step, hit, n)
         dynamics.settle(x, n)
         store(x, first, n, state)
         store(hit, first, n, impacts)
@@ -141,7 +139,7 @@ def backward(
     """Gradients for ``late`` (18, N) at the end of a tape: ``result`` (EVERY, N) to the state at its beginning, the openings,
     and with ``rig`` the parameters; ``by_force`` (K, 2, N) to the samples of the force."""
     points, u, f = np.empty((STAGES, at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx, g = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK))
+    p, g = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
     x, lam, sums = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK))
     trial = np.empty((at.STATES, BLOCK))
     out, total = np.empty((EVERY, BLOCK)), np.empty((EVERY, BLOCK))
@@ -154,7 +152,7 @@ def backward(
         for k in range(tape.shape[1] - 1, -1, -1):
             load(tape[first // BLOCK, k], 0, n, points[0])
             load(forces[k // steps], first, n, f)
-            lay_out(points, u, f, p, 1, step, x, dx, sums, trial, n)
+            lay_out(points, u, f, p, 1, step, x, sums, trial, n)
             if rig:
                 back_over(adjoint_rig, points, u, f, p, 1, step, lam, x, g, out, total, n)
             else:

@@ -1,22 +1,15 @@
-"""Addresses as machine code knows them: what a compiled loop and its stages read, call and put on their stacks."""
+"""Addresses as machine code knows them: what a compiled loop and its stages read and call."""
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import BLOCK
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.loop.stage import ARGUMENTS
 
-__all__ = ["call", "carray", "pointer", "scratch"]
-
-ARGUMENTS = 7
-"""Of a stage."""
+__all__ = ["call", "carray", "pointer"]
 
 if TYPE_CHECKING:
 
@@ -28,10 +21,6 @@ if TYPE_CHECKING:
 
     def call(address: int, *arguments: int) -> int:
         """Call the stage at an address."""
-
-    def scratch(rows: int) -> Array:
-        """A block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
-
 else:
     from numba import carray
 
@@ -56,19 +45,3 @@ else:
             return builder.call(function, [builder.extract_value(given[1], k) for k in range(ARGUMENTS)])
 
         return signature, generate
-
-    @intrinsic(prefer_literal=True)
-    def scratch(context, rows):
-        """A block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
-        array = types.Array(types.float64, 2, "C")
-
-        def generate(context, builder, signature, arguments):
-            shape = (rows.literal_value, BLOCK)
-            data = cgutils.alloca_once(builder, ir.DoubleType(), size=shape[0] * BLOCK)
-            number = partial(context.get_constant, types.intp)
-            made = make_array(array)(context, builder)
-            strides = [number(8 * BLOCK), number(8)]
-            populate_array(made, data, [number(size) for size in shape], strides, number(8), None)
-            return made._getvalue()
-
-        return array(rows), generate

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import BLOCK
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.records import Rows
 
 _STAGES: list[tuple[Callable[..., int], Sequence[type[Rows] | None]]] = []
@@ -27,11 +26,6 @@ def carray(place: tuple[int, type], shape: Sequence[int]) -> NDArray[Any]:
     count = int(np.prod(sizes)) * np.dtype(kind).itemsize
     memory: Any = (ctypes.c_char * count).from_address(address)
     return np.frombuffer(memory, dtype=kind).reshape(sizes)
-
-
-def scratch(rows: int) -> Array:
-    """A block of ``rows`` rows, NaN until something is written."""
-    return np.full((rows, BLOCK), np.nan)
 
 
 def address_of(stage: Callable[..., int], layouts: Sequence[type[Rows] | None]) -> int:

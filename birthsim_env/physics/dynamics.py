@@ -1,17 +1,19 @@
 """The right-hand side of the whole rig, written once, and its integrator: kernels over lanes.
 
 State rows are those of ``lanes.STATE_NAMES``. A kernel copies one block of lanes at a time into scratch arrays of constant
-shape, works there, and copies back; the right-hand side is inlined where it is used.
+shape, works there, and copies back; the right-hand side is inlined where it is used. The rates of a lane, ``dx``, are a column:
+they go from the right-hand side to the Runge-Kutta stage in registers.
 """
 
 import math
 
-import numpy as np
-
 from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.blocks import BLOCK, WARP
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.shared import anew
+from birthsim_env.physics.compiled.stack import column, scratch
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 from birthsim_env.physics.step import STEP
 
@@ -68,7 +70,7 @@ def chamber_rates(
     length: float,
     length_rate: float,
 ) -> None:
-    """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
+    """Writes dP/dt and dT/dt of one chamber of lane ``i``; ``length`` is that of its air column, m."""
     t = x[temperature, i]
     volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
     # One division serves the chamber: 1/(P V) = T inverse, 1/P = V T inverse, 1/T = P V inverse.
@@ -101,8 +103,8 @@ def exchange(
     heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
     expansion = x[pressure, i] * (p[area, i] * length_rate)
     pressing = chambers.pressing_power(carried, expansion, heat, gas, p[at.GAMMA, i])
-    dx[pressure, i] = pressing * (x[pressure, i] * (t * inverse))
-    dx[temperature, i] = chambers.warming_power(pressing, expansion, supplied - exhausted, gas, t) * (t * t * inverse)
+    dx[pressure] = pressing * (x[pressure, i] * (t * inverse))
+    dx[temperature] = chambers.warming_power(pressing, expansion, supplied - exhausted, gas, t) * (t * t * inverse)
 
 
 @helper
@@ -123,44 +125,48 @@ def piston_friction(
 
 
 @helper
+def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int) -> None:
+    """dx/dt (18,) of lane ``i``: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
+    y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
+    r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+        y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
+    )
+
+    friction1, dz1 = piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
+    friction2, dz2 = piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
+    force1 = (
+        mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
+        - friction1
+        - mechanics.stop_force(y1, v1, p[at.HALF_L1, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
+        + mechanics.user_force1(f[0, i], f[1, i], kappa, sine, cosine)
+    )
+    force2 = (
+        mechanics.piston_force(x[at.PP2, i], x[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], p[at.ATMOSPHERE, i])
+        - friction2
+        - mechanics.stop_force(y2, v2, p[at.HALF_L2, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
+        + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
+    )
+    dx[at.Y1] = v1
+    dx[at.V1] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
+    dx[at.Y2] = v2
+    dx[at.V2] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
+    dx[at.Z1], dx[at.Z2] = dz1, dz2
+
+    chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
+    chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
+    chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
+    chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
+    dx[at.S1P] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
+    dx[at.S1N] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]
+    dx[at.S2P] = (u[2, i] - x[at.S2P, i]) * p[at.SPOOL_RATE, i]
+    dx[at.S2N] = (u[3, i] - x[at.S2N, i]) * p[at.SPOOL_RATE, i]
+
+
+@helper
 def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -> None:
-    """dx/dt of ``n`` lanes: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
+    """``lane_rates`` of ``n`` lanes, (18, n)."""
     for i in range(n):
-        y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
-        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
-        )
-
-        friction1, dz1 = piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
-        friction2, dz2 = piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
-        force1 = (
-            mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
-            - friction1
-            - mechanics.stop_force(y1, v1, p[at.HALF_L1, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
-            + mechanics.user_force1(f[0, i], f[1, i], kappa, sine, cosine)
-        )
-        force2 = (
-            mechanics.piston_force(x[at.PP2, i], x[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], p[at.ATMOSPHERE, i])
-            - friction2
-            - mechanics.stop_force(y2, v2, p[at.HALF_L2, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
-            + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
-        )
-        dx[at.Y1, i] = v1
-        dx[at.V1, i] = mechanics.acceleration1(
-            force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i]
-        )
-        dx[at.Y2, i] = v2
-        dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
-        dx[at.Z1, i], dx[at.Z2, i] = dz1, dz2
-
-        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
-        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
-        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
-        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
-        dx[at.S1P, i] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
-        dx[at.S1N, i] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]
-        dx[at.S2P, i] = (u[2, i] - x[at.S2P, i]) * p[at.SPOOL_RATE, i]
-        dx[at.S2N, i] = (u[3, i] - x[at.S2N, i]) * p[at.SPOOL_RATE, i]
+        lane_rates(x, u, f, p, dx[:, i], i)
 
 
 @helper
@@ -190,8 +196,7 @@ def settle(x: Array, n: int) -> None:
 @kernel
 def derivatives(state: Array, command: Array, force: Array, parameters: Array, rates: Array) -> None:
     """Writes d(state)/dt into ``rates`` (18, N)."""
-    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
+    x, u, f, p, dx = scratch(STATES), scratch(4), scratch(2), scratch(PARAMETERS), scratch(STATES)
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
         load(state, first, n, x)
@@ -213,12 +218,26 @@ def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
 
 
 @helper
-def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
-    """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
-    for row in range(total.shape[0]):
-        for i in range(n):
-            total[row, i] += weight * dx[row, i]
-            trial[row, i] = x[row, i] + ahead * dx[row, i]
+def stage(x: Array, u: Array, f: Array, p: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
+    """Adds ``weight`` times the rates at ``trial`` to ``total`` and puts the next trial state at x + ``ahead`` times them."""
+    dx = column(STATES)
+    for i in range(n):
+        lane_rates(trial, u, f, p, dx, i)
+        for row in range(STATES):
+            total[row, i] += weight * dx[row]
+            trial[row, i] = x[row, i] + ahead * dx[row]
+
+
+@helper
+def last_stage(x: Array, u: Array, f: Array, p: Array, total: Array, trial: Array, n: int, weight: float) -> None:
+    """The stage that ends a step: the state, and the first trial state of the next step, are the sum."""
+    dx = column(STATES)
+    for i in range(n):
+        lane_rates(trial, u, f, p, dx, i)
+        for row in range(STATES):
+            total[row, i] += weight * dx[row]
+            trial[row, i] = total[row, i]
+            x[row, i] = total[row, i]
 
 
 @helper
@@ -245,31 +264,27 @@ def steps_in(time: float) -> int:
 
 
 @helper
-def integrate(
-    x: Array,
-    u: Array,
-    f: Array,
-    p: Array,
-    steps: int,
-    step: float,
-    impacts: Array,
-    dx: Array,
-    total: Array,
-    trial: Array,
-    n: int,
-) -> None:
+def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, n: int) -> None:
     """Integrates ``n`` lanes of a state ``x`` by ``steps`` Runge-Kutta steps of ``step`` s under constant inputs.
 
-    ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop; the rest is scratch (18, n).
+    ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop.
     """
+    before, total, trial = scratch(STATES), scratch(STATES), scratch(STATES)
+    copy(x, before, n)
+    copy(x, total, n)
+    copy(x, trial, n)
     for _ in range(steps):
-        copy(x, total, n)
-        copy(x, trial, n)
         for k in range(STAGES):
-            right_hand_side(trial, u, f, p, dx, n)
-            stage(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
-        copy(total, x, n)
-        record_impacts(x, p, impacts, n)
+            own = anew(p)
+            if k < STAGES - 1 or WARP:
+                stage(before, u, f, own, total, trial, n, weight_of(k, step), ahead_of(k, step))
+            else:
+                last_stage(before, u, f, own, total, trial, n, weight_of(k, step))
+        if WARP:  # with one right-hand side, since two of them are too long for a thread's instructions to stay at hand
+            copy(total, before, n)
+            copy(total, trial, n)
+        record_impacts(total, p, impacts, n)
+    copy(total, x, n)
 
 
 @kernel
@@ -279,9 +294,7 @@ def advance(state: Array, command: Array, forces: Array, parameters: Array, step
     ``forces`` (K, 2, N): each of the K samples is held for ``steps`` steps of ``step`` seconds. ``impacts`` (2, N) gets
     the largest speed at which each piston ran into an end stop.
     """
-    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
-    total, trial, hit = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((2, BLOCK))
+    x, u, f, p, hit = scratch(STATES), scratch(4), scratch(2), scratch(PARAMETERS), scratch(2)
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
         load(state, first, n, x)
@@ -290,7 +303,7 @@ def advance(state: Array, command: Array, forces: Array, parameters: Array, step
         hit[:] = 0.0
         for sample in range(forces.shape[0]):
             load(forces[sample], first, n, f)
-            integrate(x, u, f, p, steps, step, hit, dx, total, trial, n)
+            integrate(x, u, f, p, steps, step, hit, n)
         settle(x, n)
         store(x, first, n, state)
         store(hit, first, n, impacts)

@@ -16,7 +16,8 @@ import numpy as np
 
 from birthsim_env.physics import dynamics, valves
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
@@ -67,7 +68,7 @@ def lagged_chamber(
     supplied, exhausted = dynamics.flows_of(x, p, i, pressure, temperature, spool)
     row = at.STATES + FLOWS + chamber
     rate = p[at.TUBE_RATE, i]
-    dx[row, i], dx[row + 4, i] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
+    dx[row], dx[row + 4] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
     if rate > 0.0:
         inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
         dynamics.exchange(
@@ -97,13 +98,13 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
     dynamics.right_hand_side(x, u, pull, own, dx, n)
     for i in range(n):
         y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
-        half1, half2 = own[at.HALF_L1, i], own[at.HALF_L2, i]
+        half1, half2, rates = own[at.HALF_L1, i], own[at.HALF_L2, i], dx[:, i]
         drawn = lagged_chamber(
-            x, own, dx, i, 0, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
-        ) + lagged_chamber(x, own, dx, i, 1, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
+            x, own, rates, i, 0, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
+        ) + lagged_chamber(x, own, rates, i, 1, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
         drawn += lagged_chamber(
-            x, own, dx, i, 2, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
-        ) + lagged_chamber(x, own, dx, i, 3, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
+            x, own, rates, i, 2, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
+        ) + lagged_chamber(x, own, rates, i, 3, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
         source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
         filled = own[at.LINE, i] * valves.driving_flow(
             source,
@@ -118,6 +119,15 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
             own[at.LAMINAR, i],
         )
         dx[at.STATES + RESERVOIR, i] = own[at.LINE_GAIN, i] * (filled - drawn) if own[at.LINE, i] > 0.0 else 0.0
+
+
+@helper
+def combine(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
+    """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
+    for row in range(ALL):
+        for i in range(n):
+            total[row, i] += weight * dx[row, i]
+            trial[row, i] = x[row, i] + ahead * dx[row, i]
 
 
 @helper
@@ -138,7 +148,7 @@ def integrate(
         dynamics.copy(x, trial, n)
         for k in range(STAGES):
             right_hand_side(trial, u, f, own, motion, pull, dx, n)
-            dynamics.stage(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
+            combine(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
         dynamics.copy(total, x, n)
         dynamics.record_impacts(x, p, impacts, n)
     dynamics.settle(x, n)

@@ -5,7 +5,7 @@ import pytest
 
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
