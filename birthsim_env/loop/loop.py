@@ -61,8 +61,8 @@ def run_stage(stages: NDArray[np.int64], s: int, base: np.int64, start: int, n: 
     return call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
 
 
-ABOUT = 6
-"""Whole numbers that describe a loop."""
+MOVES, MOVED, STAGES, STAGED, ROWS, LANES = range(6)
+"""Where the whole numbers that describe a loop stand."""
 
 
 @kernel
@@ -72,10 +72,10 @@ def _run(about: int, periods: int, first: int, last: int) -> int:
     Moves (M, 4): address of an array, its rows, its first row in a block, whether it is written. Stages (S, 7): address of
     the function; rows at which world, seen and memory begin (-1: none); addresses of constants and tables; 1 for a closing
     stage."""
-    told = carray(pointer(about, np.int64), (ABOUT,))
-    moves = carray(pointer(told[0], np.int64), (told[1], MOVE))
-    stages = carray(pointer(told[2], np.int64), (told[3], ENTRY))
-    rows, lanes = told[4], told[5]
+    told = carray(pointer(about, np.int64), (LANES + 1,))
+    moves = carray(pointer(told[MOVES], np.int64), (told[MOVED], MOVE))
+    stages = carray(pointer(told[STAGES], np.int64), (told[STAGED], ENTRY))
+    rows, lanes = told[ROWS], told[LANES]
     space, missed = np.empty((rows, BLOCK)), 0
     base = np.int64(space.ctypes.data)
     for start in range(first, last, BLOCK):

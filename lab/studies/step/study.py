@@ -128,4 +128,4 @@ STUDY = Study(
     allowed={"beside": [method for method in STEPS if method != DEFAULT]},
     words={"rigs": "random corners, and as many random rigs", "beside": "steps that controllers are measured with besides"},
 )  # fmt: skip
-register(study="step", about="the plant's step of integration beside others, alone and under every controller")(STUDY)
+register(study="step", about="the plant's step of integration beside other steps")(STUDY)
