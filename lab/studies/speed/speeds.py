@@ -163,7 +163,7 @@ def measured(jobs: tuple[Job, ...], trees: tuple[Path, ...], budget: float) -> d
 
 
 def first_steps() -> Iterator[tuple[str, float]]:
-    """CPU s from the start of new processes to the end of a first step: valve mode and every law, prebuilt, compiled and cached.
+    """CPU s from the start of new processes to the end of a first step: valve mode and all laws, prebuilt, compiled and cached.
 
     All processes share a folder for machine code, which is empty at the beginning: each compiles what those before it have not,
     where it does without prebuilt code.
