@@ -12,6 +12,7 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
+import birthsim_env.physics.compiled.with_numba  # noqa: F401 (loads LLVM, once a process)
 from birthsim_env.physics.compiled import prebuilt
 from birthsim_env.physics.compiled.kept import cache_folder
 from tests.console import ROOT
