@@ -41,9 +41,13 @@ def _tasks(options: Options) -> dict[Any, Task]:
         for member, own in settings_of(name, Parameters()).items():
             for method in (DEFAULT, *options.beside):
                 settings = {
-                    "method": method, "settings": own, "environments": list(options.env), "sensors": list(options.sensors),
-                    "episodes": options.episodes, "seed": options.seed,
-                }  # fmt: skip
+                    "method": method,
+                    "settings": own,
+                    "environments": list(options.env),
+                    "sensors": list(options.sensors),
+                    "episodes": options.episodes,
+                    "seed": options.seed,
+                }
                 pieces[method, "loops", member] = Task(f"loops/{file_stem(member)}-{method}", closed_loops, settings)
     return pieces
 
@@ -94,13 +98,19 @@ def loops_of(member: str, beside: Sequence[str], found: Found) -> list[dict[str,
                     apart = (_numbers(other["metrics"][metric]) - plain)[both]
                     rows.append(
                         {
-                            "controller": member, "environment": environment, "sensors": sensors, "metric": metric,
-                            "step": method, "worlds": int(both.sum()),
+                            "controller": member,
+                            "environment": environment,
+                            "sensors": sensors,
+                            "metric": metric,
+                            "step": method,
+                            "worlds": int(both.sum()),
                             "lost": [sum(usual["lost"]), sum(other["lost"])],
-                            "mean": _digits(plain[both].mean()), "scatter": _digits(plain[both].std(ddof=1)),
-                            "difference": _digits(apart.mean()), "spread": _digits(apart.std(ddof=1)),
+                            "mean": _digits(plain[both].mean()),
+                            "scatter": _digits(plain[both].std(ddof=1)),
+                            "difference": _digits(apart.mean()),
+                            "spread": _digits(apart.std(ddof=1)),
                         }
-                    )  # fmt: skip
+                    )
     return rows
 
 
@@ -118,8 +128,13 @@ def _shown(content: Content) -> dict[str, str]:
 
 STUDY = Study(
     {
-        "beside": ("rk3", "fine"), "controller": tuple(controlling_names()), "env": ENVIRONMENTS, "sensors": COMPARED,
-        "rigs": 8, "episodes": 16, "seed": SEED,
+        "beside": ("rk3", "fine"),
+        "controller": tuple(controlling_names()),
+        "env": ENVIRONMENTS,
+        "sensors": COMPARED,
+        "rigs": 8,
+        "episodes": 16,
+        "seed": SEED,
     },
     _tasks,
     _kept,
@@ -127,5 +142,5 @@ STUDY = Study(
     _shown,
     allowed={"beside": [method for method in STEPS if method != DEFAULT]},
     words={"rigs": "random corners, and as many random rigs", "beside": "steps that controllers are measured with besides"},
-)  # fmt: skip
+)
 register(study="step", about="the plant's step of integration beside other steps")(STUDY)
