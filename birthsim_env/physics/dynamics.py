@@ -35,73 +35,110 @@ def driving_flows(p: Array, i: int, pressure: float, inverse: float, inside: flo
 
 
 @helper
-def orifice_flows(x: Array, p: Array, i: int, pressure: int, spool: int, inverse: float, inside: float) -> tuple[float, float]:
-    """Mass flows of a chamber given by its state rows: in from the supply and out to the atmosphere, kg/s.
+def orifice_flows(p: Array, i: int, pressure: float, opening: float, inverse: float, inside: float) -> tuple[float, float]:
+    """Mass flows of a chamber whose spool is at ``opening``: in from the supply and out to the atmosphere, kg/s.
 
     ``inverse`` is 1/P of the chamber, ``inside`` the coldness of its air.
     """
-    fill, drain = driving_flows(p, i, x[pressure, i], inverse, inside)
-    supply = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    exhaust = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    fill, drain = driving_flows(p, i, pressure, inverse, inside)
+    supply = valves.supply_conductance(opening, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    exhaust = valves.exhaust_conductance(opening, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
     return supply * fill, exhaust * drain
 
 
 @helper
 def flows_of(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> tuple[float, float]:
     """``orifice_flows`` of a chamber given by its state rows alone."""
-    return orifice_flows(x, p, i, pressure, spool, 1.0 / x[pressure, i], p[at.T0, i] / x[temperature, i])
+    return orifice_flows(p, i, x[pressure, i], x[spool, i], 1.0 / x[pressure, i], p[at.T0, i] / x[temperature, i])
 
 
 @helper
 def chamber_rates(
-    x: Array,
     p: Array,
-    dx: Array,
     i: int,
-    pressure: int,
-    temperature: int,
-    other: int,
-    spool: int,
-    area: int,
-    perimeter: int,
+    pressure: float,
+    temperature: float,
+    other: float,
+    opening: float,
+    area: float,
+    perimeter: float,
     length: float,
     length_rate: float,
-) -> None:
-    """Writes dP/dt and dT/dt of one chamber of lane ``i``; ``length`` is that of its air column, m."""
-    t = x[temperature, i]
-    volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
+) -> tuple[float, float]:
+    """dP/dt and dT/dt of a chamber; ``other`` is the temperature behind its piston, ``length`` that of its air column, m."""
+    volume = p[at.DEAD_VOLUME, i] + area * length
     # One division serves the chamber: 1/(P V) = T inverse, 1/P = V T inverse, 1/T = P V inverse.
-    energy = x[pressure, i] * volume
-    inverse = 1.0 / (energy * t)
-    supplied, exhausted = orifice_flows(x, p, i, pressure, spool, volume * (t * inverse), p[at.T0, i] * (energy * inverse))
-    exchange(x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, supplied, exhausted, inverse)
+    energy = pressure * volume
+    inverse = 1.0 / (energy * temperature)
+    cold = p[at.T0, i] * (energy * inverse)
+    supplied, exhausted = orifice_flows(p, i, pressure, opening, volume * (temperature * inverse), cold)
+    return exchange(p, i, pressure, temperature, other, area, perimeter, length, length_rate, supplied, exhausted, inverse)
 
 
 @helper
 def exchange(
-    x: Array,
     p: Array,
-    dx: Array,
     i: int,
-    pressure: int,
-    temperature: int,
-    other: int,
-    area: int,
-    perimeter: int,
+    pressure: float,
+    temperature: float,
+    other: float,
+    area: float,
+    perimeter: float,
     length: float,
     length_rate: float,
     supplied: float,
     exhausted: float,
     inverse: float,
-) -> None:
+) -> tuple[float, float]:
     """``chamber_rates`` under given flows from the supply and to the atmosphere, kg/s; ``inverse`` is 1/(P V T)."""
-    t, wall, gas = x[temperature, i], p[at.TEMPERATURE, i], p[at.GAS, i]
+    t, wall, gas = temperature, p[at.TEMPERATURE, i], p[at.GAS, i]
     carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
-    heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
-    expansion = x[pressure, i] * (p[area, i] * length_rate)
+    heat = chambers.heat_flow(t, other, wall, length, area, perimeter, p[at.H_WALL, i], p[at.G12, i])
+    expansion = pressure * (area * length_rate)
     pressing = chambers.pressing_power(carried, expansion, heat, gas, p[at.GAMMA, i])
-    dx[pressure] = pressing * (x[pressure, i] * (t * inverse))
-    dx[temperature] = chambers.warming_power(pressing, expansion, supplied - exhausted, gas, t) * (t * t * inverse)
+    warming = chambers.warming_power(pressing, expansion, supplied - exhausted, gas, t)
+    return pressing * (pressure * (t * inverse)), warming * (t * t * inverse)
+
+
+@helper
+def air_rates(x: Array, p: Array, dx: Array, i: int) -> None:
+    """Writes dP/dt and dT/dt of the chambers P1, N1, P2 and N2 of lane ``i``."""
+    length, length_rate, other, area, perimeter = column(4), column(4), column(4), column(4), column(4)
+    half1, half2, y1, y2 = p[at.HALF_L1, i], p[at.HALF_L2, i], x[at.Y1, i], x[at.Y2, i]
+    length[0], length[1], length[2], length[3] = half1 + y1, half1 - y1, half2 + y2, half2 - y2
+    length_rate[0], length_rate[1], length_rate[2], length_rate[3] = x[at.V1, i], -x[at.V1, i], x[at.V2, i], -x[at.V2, i]
+    other[0], other[1], other[2], other[3] = x[at.TN1, i], x[at.TP1, i], x[at.TN2, i], x[at.TP2, i]
+    area[0], area[1], area[2], area[3] = p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.AREA_P2, i], p[at.AREA_N2, i]
+    perimeter[0], perimeter[1] = p[at.PERIMETER1, i], p[at.PERIMETER1, i]
+    perimeter[2], perimeter[3] = p[at.PERIMETER2, i], p[at.PERIMETER2, i]
+    if BLOCK == 1:
+        for c in range(4):  # in one vector: there are no other lanes to fill it
+            one_chamber(x, p, dx, i, c, other[c], area[c], perimeter[c], length[c], length_rate[c])
+    else:
+        one_chamber(x, p, dx, i, 0, other[0], area[0], perimeter[0], length[0], length_rate[0])
+        one_chamber(x, p, dx, i, 1, other[1], area[1], perimeter[1], length[1], length_rate[1])
+        one_chamber(x, p, dx, i, 2, other[2], area[2], perimeter[2], length[2], length_rate[2])
+        one_chamber(x, p, dx, i, 3, other[3], area[3], perimeter[3], length[3], length_rate[3])
+
+
+@helper
+def one_chamber(
+    x: Array,
+    p: Array,
+    dx: Array,
+    i: int,
+    chamber: int,
+    other: float,
+    area: float,
+    perimeter: float,
+    length: float,
+    length_rate: float,
+) -> None:
+    """Writes ``chamber_rates`` of a chamber by its number: its rows follow those of the one before."""
+    pressure, temperature = at.PP1 + 2 * chamber, at.TP1 + 2 * chamber
+    dx[pressure], dx[temperature] = chamber_rates(
+        p, i, x[pressure, i], x[temperature, i], other, x[at.S1P + chamber, i], area, perimeter, length, length_rate
+    )
 
 
 @helper
@@ -149,10 +186,7 @@ def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int) -> Non
     dx[at.V2] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
     dx[at.Z1], dx[at.Z2] = dz1, dz2
 
-    chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
-    chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
-    chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
-    chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
+    air_rates(x, p, dx, i)
     dx[at.S1P] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
     dx[at.S1N] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]
     dx[at.S2P] = (u[2, i] - x[at.S2P, i]) * p[at.SPOOL_RATE, i]

@@ -70,8 +70,19 @@ def lagged_chamber(
     dx[row], dx[row + 4] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
     if rate > 0.0:
         inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
-        dynamics.exchange(
-            x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, x[row, i], x[row + 4, i], inverse
+        dx[pressure], dx[temperature] = dynamics.exchange(
+            p,
+            i,
+            x[pressure, i],
+            x[temperature, i],
+            x[other, i],
+            p[area, i],
+            p[perimeter, i],
+            length,
+            length_rate,
+            x[row, i],
+            x[row + 4, i],
+            inverse,
         )
     return supplied
 
