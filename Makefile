@@ -13,6 +13,7 @@
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
 # make devcontainer writes .devcontainer/, where VS Code and Codespaces look, from packaging/container
 # make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
+# make kernels builds the machine code that the package carries, at a release; between two, Numba compiles what was edited
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
 VENV := .venv
@@ -53,7 +54,7 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-.PHONY: run figure test test-slow quick test-weekly portable oldest fuzz mutation soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links devcontainer golden clean
+.PHONY: run figure test test-slow quick test-weekly portable oldest fuzz mutation soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page kernels docs docs-links devcontainer golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml packaging/requirements/base.txt
@@ -127,7 +128,7 @@ portable: $(READY)
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m lab.studies.processors here
+	BIRTHSIM_PREBUILT=0 PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m lab.studies.processors here
 
 # A full disk needs root.
 kills: $(READY)
@@ -233,6 +234,10 @@ targets: $(READY)
 
 page: $(READY)
 	$(BIN)/python -m birthsim_live.rig.build
+
+# KERNELS="--check --every", as birthsim_build/kernels/__main__.py says.
+kernels: $(READY)
+	$(BIN)/python -m birthsim_build.kernels $(KERNELS)
 
 # Odd input ends a process that goes on from it: without workers, the last test named is the one.
 fuzz: $(READY)

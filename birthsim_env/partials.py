@@ -94,7 +94,8 @@ def shared(path: Path) -> None:
 def _new_lock(hidden: Path) -> tuple[Path, int]:
     """A lock of this process, and its descriptor."""
     while True:
-        if hidden.is_symlink() or (hidden.exists() and not hidden.is_dir()):
+        # In one look: another writer, the last one there, may remove the folder between two.
+        if not stat.S_ISDIR(_mode(hidden)):
             raise ValueError(f"{str(hidden)!r} is no folder; allowed: a folder of that name, or none")
         with suppress(FileExistsError):
             hidden.mkdir()
@@ -109,6 +110,14 @@ def _new_lock(hidden: Path) -> tuple[Path, int]:
         if _locked(descriptor) is not False and lock.exists():
             return lock, descriptor
         os.close(descriptor)
+
+
+def _mode(hidden: Path) -> int:
+    """What ``hidden`` is; a folder where there is nothing yet."""
+    try:
+        return hidden.lstat().st_mode
+    except FileNotFoundError:
+        return stat.S_IFDIR
 
 
 def _remove_dead(lock: Path) -> bool:

@@ -11,10 +11,9 @@ from importlib import import_module
 from multiprocessing import get_context
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
 
-from birthsim_env.loop.machine import ARGUMENTS
-from birthsim_env.loop.stage import address_of
+from birthsim_env.loop.stage import ARGUMENTS, address_of
+from birthsim_env.physics.compiled.compilation import Kernel
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.processors import ROOT
@@ -30,8 +29,12 @@ def stages() -> list[str]:
             if any(part in module.name for part in (".figures.", "jax_rollouts")):  # without kernels
                 continue
             for name, value in vars(import_module(module.name)).items():
-                # A helper, which derives from it, is compiled in the kernels that call it.
-                if type(value) is CPUDispatcher and value.py_func.__code__.co_varnames[:2] == ("world", "seen"):
+                # A helper is compiled in the kernels that call it.
+                if (
+                    isinstance(value, Kernel)
+                    and not value.inlined
+                    and value.py_func.__code__.co_varnames[:2] == ("world", "seen")
+                ):
                     assert value.py_func.__code__.co_argcount == ARGUMENTS
                     found[f"{value.py_func.__module__}:{name}"] = value.py_func.__code__
     return sorted(found, key=lambda name: -len(found[name].co_code))

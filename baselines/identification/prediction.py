@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from baselines.identification.windows import Windows, admitted_openings, spools_at
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.dynamics import integrate, load, settle, steps_in, store
 from birthsim_env.physics.geometry import end_effector_motion

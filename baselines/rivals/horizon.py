@@ -19,11 +19,11 @@ from birthsim_env.gradients.tracing import call
 from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.physics.classical import STAGES, ahead_of, weight_of
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
 from birthsim_env.physics.dynamics import load
-from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
 NODES = 7
 """Nodes of the horizon."""

@@ -16,7 +16,6 @@ second started from what the first had found:
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
@@ -55,6 +54,8 @@ def regulator(mass: float, viscous: float, scale: float, tolerances: Array) -> A
     It is solved in the natural units of the loop, in which the tolerances of integral and input count 1: SI units span
     too many decades. With time in 1/w the states are w^3 integral, w^2 e, w de/dt and D/m_e.
     """
+    from scipy.linalg import solve_continuous_are  # late: it takes 0.3 s, and other controllers do without
+
     a, b = error_dynamics(mass, viscous, scale)
     apparent = mass * scale**2
     w = (RATE_TOLERANCE / (mass * tolerances[0])) ** 0.25

@@ -31,11 +31,13 @@ class Settings:
 def main(_: Settings) -> None:
     """Print it."""
     from birthsim_env.extras import installation
+    from birthsim_env.physics.compiled import prebuilt
     from birthsim_env.physics.compiled.kept import cache_folder
 
     print(f"{'Python':12}{platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} processors")
     for name in ("birthsim", "gymnasium", "numpy", "numba", "llvmlite", "scipy", "torch"):
         print(f"{name:12}{found(name) or 'missing'}")
+    print(f"{'prebuilt':12}{prebuilt.described()}")
     folder = cache_folder()
     held = 0 if folder is None else sum(1 for _ in folder.rglob("*.nbc"))
     print(

@@ -1,4 +1,4 @@
-"""``birthsim warmup``: compile ahead what commands need first, so that the first one starts at once."""
+"""``birthsim warmup``: compile ahead what has no prebuilt code, so that the first command starts at once."""
 
 import time
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 @dataclass
 class Settings:
-    """Compile the kernels of every controller; they stay in the cache."""
+    """Compile the kernels of every controller that are not prebuilt; they stay in the cache."""
 
 
 def main(_: Settings) -> None:
@@ -25,4 +25,4 @@ def main(_: Settings) -> None:
             env.reset(seed=0)
             env.step(NO_ACTION)
             env.close()
-    print(f"{len(names)} controllers are compiled: {time.perf_counter() - began:.1f} s")
+    print(f"{len(names)} controllers are ready: {time.perf_counter() - began:.1f} s")

@@ -17,6 +17,7 @@ from birthsim.command_line.settings import CONTROL, CONTROLLER, ENV, MANY, SENSO
 from birthsim.exports import Form
 from birthsim_build.building import Report, build_c, build_cortex, build_threads, build_wasm
 from birthsim_build.bundle import make_bundle, scenario_of
+from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.ptx import require_assembler
 from birthsim_build.code.targets import TARGETS
@@ -154,8 +155,9 @@ def _show(report: Report) -> None:
             print(fill(f"{name}: {said}", 80, subsequent_indent="    "))
     print(aligned(("", "bytes"), sizes))
     if thread := report.get("thread"):
-        memory, spilled, registers = (thread[one] for one in ("memory", "spilled", "registers"))
+        memory, spilled, registers, shared = (thread[one] for one in ("memory", "spilled", "registers", "shared"))
         print(f"a thread takes {registers} registers and {memory:,} bytes of memory; {spilled:,} bytes are spilled registers")
+        print(f"a block of {WIDTH} threads shares {shared:,} bytes")
     if laws := report.get("estimate"):
         counts = [(law, *(f"{found[one]:,.0f}" for one in ("operations", "cycles", "most"))) for law, found in laws.items()]
         print(f"\n{aligned(('a period, estimated', 'operations', 'cycles', 'at most'), counts)}")

@@ -6,9 +6,8 @@ import numpy as np
 
 from birthsim_build.image import ENTRY, HEAD, LEFT_OUT, PART_HEAD, Words
 from birthsim_build.layout import ROWS, Inputs
-from birthsim_env.loop.machine import ARGUMENTS
 from birthsim_env.loop.rows import WORLD
-from birthsim_env.loop.stage import call, carray, pointer
+from birthsim_env.loop.stage import ARGUMENTS, call, carray, pointer
 from birthsim_env.physics.compiled.compilation import helper, kernel
 
 STAGE_ARGUMENTS = 5

@@ -18,6 +18,7 @@ import numba
 import numpy as np
 from llvmlite.binding import llvm_version_info
 
+from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.threads import Threads
 from birthsim_build.code.tools import run_tool
 from birthsim_build.image import Words
@@ -32,6 +33,8 @@ ONE_LANE = {
 }
 """Environment of the process that compiles for one lane, and not for the processor that it runs on."""
 
+ON_A_WARP = {"BIRTHSIM_WARP": str(WIDTH)}
+"""Further environment where threads run lanes; in WebAssembly, which has one thread, kernels are as for one lane alone."""
 
 LEAST_LLVM = 22
 """LLVM 20 gives ``baselines.estimation.observers.observe`` other bits once the function is local to the code; LLVM 21 is
@@ -69,6 +72,7 @@ def compile_object(
 
 def _compiled(request: dict[str, Any], arrays: dict[str, Words]) -> dict[str, bytes]:
     """Ending -> content of the files that the process writes."""
+    further = ON_A_WARP if request["threads"] and request["target"] != "wasm" else {}
     with tempfile.TemporaryDirectory() as folder:
         place, out = Path(folder) / "data.npz", Path(folder) / "code.o"
         np.savez(place, **arrays)  # type: ignore[arg-type]
@@ -77,7 +81,7 @@ def _compiled(request: dict[str, Any], arrays: dict[str, Words]) -> dict[str, by
             input=json.dumps({**request, "data": str(place), "out": str(out)}),
             text=True,
             check=True,
-            env={**os.environ, **ONE_LANE},
+            env={**os.environ, **ONE_LANE, **further},
         )
         return {path.suffix: path.read_bytes() for path in Path(folder).glob("code.*")}
 

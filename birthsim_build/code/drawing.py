@@ -5,7 +5,8 @@ import numpy as np
 from birthsim_env.loop.stage import carray, pointer, scratch
 from birthsim_env.loop.world import Start
 from birthsim_env.parts.drawn.streams import POOL, States, Words, bounded, fraction, next64, seed
-from birthsim_env.physics.compiled.compilation import BLOCK, helper
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 WORDS, OUT = POOL + 2, 2 * POOL

@@ -1,9 +1,13 @@
-"""What an object file in ELF holds: sizes of its sections, and the names that it expects from elsewhere."""
+"""What an object file or a library in ELF holds: sizes of its sections, names that it has, and those that it expects."""
 
 import struct
+from collections.abc import Iterator
 
-SYMBOL_TABLE, EMPTY = 2, 8
-"""Kinds of sections: names, and those that take memory where the code runs only."""
+SYMBOL_TABLES, EMPTY = (2, 11), 8
+"""Kinds of sections: names, also those for a loader, and what takes memory where the code runs only."""
+
+LOCAL = 0
+"""Of names: a file's own."""
 
 
 def sections_of(content: bytes) -> dict[str, int]:
@@ -17,19 +21,28 @@ def contents_of(content: bytes) -> dict[str, bytes]:
 
 
 def undefined_in(content: bytes) -> list[str]:
-    """Names that whoever links the object must give."""
+    """Names that whoever links or loads the file must give."""
+    return sorted({name for name, is_here in _names(content) if not is_here})
+
+
+def defined_in(content: bytes) -> list[str]:
+    """Names that others find in the file."""
+    return sorted({name for name, is_here in _names(content) if is_here})
+
+
+def _names(content: bytes) -> Iterator[tuple[str, bool]]:
+    """Names that are not the file's own, and whether they stand for something in it."""
     sections = _sections(content)
     wide = content[4] == 2
     form, size = ("<IBBHQQ", 24) if wide else ("<IIIBBH", 16)
-    names = []
     for _, kind, start, length, linked in sections:
-        if kind == SYMBOL_TABLE:
+        if kind in SYMBOL_TABLES:
             strings = sections[linked][2]
             for at in range(start, start + length, size):
                 symbol = struct.unpack_from(form, content, at)
-                if symbol[0] and symbol[3 if wide else 5] == 0:
-                    names.append(_text(content, strings + symbol[0]))
-    return sorted(names)
+                about, place = (symbol[1], symbol[3]) if wide else (symbol[3], symbol[5])
+                if symbol[0] and about >> 4 != LOCAL:
+                    yield _text(content, strings + symbol[0]), place != 0
 
 
 def _sections(content: bytes) -> list[tuple[str, int, int, int, int]]:

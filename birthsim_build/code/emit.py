@@ -7,7 +7,6 @@ code counts its operations, what ``Threads`` has where threads run lanes, and th
 """
 
 import json
-import re
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -19,11 +18,12 @@ import numpy as np
 from birthsim_build.code.adjoints import backward
 from birthsim_build.code.advance import advance_code
 from birthsim_build.code.counting import counted
+from birthsim_build.code.llvm_code import cleaned, head_of, hide, machine_of
 from birthsim_build.code.targets import TARGETS, Target
 from birthsim_build.code.threads import BACK, Threads, threads_code
 from birthsim_env.gradients.source import module_of
 from birthsim_env.loop.stage import compiled
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 
 EXPORTED = "birthsim_"
 
@@ -45,13 +45,8 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
 
     Where it is to ``count``, the code counts its operations; where there are ``threads``, they run lanes.
     """
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
-    chosen = llvm.Target.from_triple(target.triple)
-    machine = chosen.create_target_machine(
-        cpu=target.processor, features=target.features, opt=3, reloc=target.reloc, codemodel="default"
-    )
-    head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
+    machine = machine_of(target)
+    head = head_of(target, machine)
     kernels = [_kernel_code(function) for function in (*functions, *(threads.adjoints if threads else ()))]
     symbols, on_device = [own for own, _ in kernels], target.triple.startswith("nvptx")
     if threads:
@@ -64,9 +59,7 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
     module = llvm.parse_assembly(head + entry + _constants(data))
     for _, code in [*runs, *kernels]:
         module.link_in(llvm.parse_assembly(head + code))
-    for one in [*module.functions, *module.global_variables]:
-        if not one.is_declaration and not one.name.startswith(EXPORTED):
-            one.linkage = llvm.Linkage.internal
+    hide(module, EXPORTED)
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(module, builder)
@@ -85,18 +78,7 @@ def _kernel_code(function: str) -> tuple[str, str]:
     """Symbol and LLVM code of the kernel ``module:name``, without what belongs to this processor or to Python."""
     module, _, name = function.partition(":")
     made = compiled(getattr(import_module(module), name))
-    code = str(made.library._get_module_for_linking())
-    code = re.sub(r"^target .*$|^source_filename.*$", "", code, flags=re.MULTILINE)
-    code = re.sub(r'"target-(cpu|features)"="[^"]*"', "", code).replace("= common ", "= internal ")
-    # Nothing is raised, so that no target needs tables to unwind.
-    code = re.sub(r"^(define [^{]*)\{$", r"\1nounwind {", code, flags=re.MULTILINE)
-    # IEEE's own operations: processors that have an instruction for them need no library.
-    for operation, numbers in (("sqrt", 1), ("floor", 1), ("fabs", 1), ("copysign", 2)):
-        intrinsic = f"@llvm.{operation}.f64("
-        code = code.replace(f"@{operation}(", intrinsic)
-        code = re.sub(rf"^declare .*{re.escape(intrinsic)}.*$", "", code, flags=re.MULTILINE)
-        code += f"\ndeclare double {intrinsic}{', '.join(['double'] * numbers)})"
-    return made.fndesc.mangled_name, code
+    return made.fndesc.mangled_name, cleaned(str(made.library._get_module_for_linking()))
 
 
 def _constants(data: Path) -> str:

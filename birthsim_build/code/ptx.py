@@ -10,7 +10,8 @@ from birthsim_env.extras import installation
 
 GPU = re.compile(r"sm_\d{2,3}[a-z]?")
 _FUNCTION = re.compile(r"Function properties for (\w+)\s+(\d+) bytes stack frame, (\d+) bytes spill stores")
-_REGISTERS = re.compile(r"Compiling entry function '(\w+)'.*?Used (\d+) registers", re.DOTALL)
+_TAKEN = re.compile(r"Compiling entry function '(\w+)'.*?Used (\d+) registers([^\n]*)", re.DOTALL)
+_SHARED = re.compile(r"(\d+) bytes smem")
 
 
 def assembler() -> str | None:
@@ -31,8 +32,8 @@ def require_assembler() -> str:
 def assemble(ptx: Path, cubin: Path, gpu: str, *options: str) -> dict[str, int]:
     """Write machine code for a ``gpu``, sm_90 for one; returns what a thread of ``birthsim_advance`` takes.
 
-    ``memory``: bytes of its own. ``spilled``: those that hold what did not fit into registers, in all functions. Raises
-    ``ValueError`` for a GPU that ``ptxas`` does not know.
+    ``memory``: bytes of its own. ``spilled``: those that hold what did not fit into registers, in all functions. ``shared``:
+    bytes that its block shares. Raises ``ValueError`` for a GPU that ``ptxas`` does not know.
     """
     if not GPU.fullmatch(gpu):
         raise ValueError(f"gpu = {gpu!r}; allowed: sm_ and the number of an architecture, as sm_90")
@@ -42,8 +43,10 @@ def assemble(ptx: Path, cubin: Path, gpu: str, *options: str) -> dict[str, int]:
     if done.returncode:
         raise ValueError(f"ptxas for gpu = {gpu!r} fails: {said.strip().splitlines()[0]}")
     functions = {name: (int(frame), int(stored)) for name, frame, stored in _FUNCTION.findall(said)}
-    registers = {name: int(count) for name, count in _REGISTERS.findall(said)}
+    taken = {name: (int(count), _SHARED.search(more)) for name, count, more in _TAKEN.findall(said)}
     own = "birthsim_advance"
+    registers, shared = taken[own]
     return {
-        "memory": functions[own][0], "spilled": sum(stored for _, stored in functions.values()), "registers": registers[own],
+        "memory": functions[own][0], "spilled": sum(stored for _, stored in functions.values()), "registers": registers,
+        "shared": int(shared[1]) if shared else 0,
     }  # fmt: skip

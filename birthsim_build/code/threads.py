@@ -1,4 +1,5 @@
-"""What runs a program (``device.program``) on a device: one thread a lane, a lane's rows in the thread's own memory.
+"""What runs a program (``device.program``) on a device: one thread a lane, a lane's rows in the thread's own memory, but for
+what the plant is integrated from (``blocks``).
 
 A graphics processor lays out the memory of neighbouring threads word by word side by side, and so do programs with the data of
 their lanes: what 32 threads read or write at once lies together.
@@ -10,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from birthsim_build.code.advance import words, wrapper
+from birthsim_build.code.blocks import WIDTH, block_code
 from birthsim_build.code.tape import begin_tape, keep
 from birthsim_env.loop.loop import load_rows, store_rows
 from birthsim_env.loop.rows import WORLD
@@ -165,6 +167,7 @@ def threads_code(threads: Threads, symbols: Sequence[str], kernels: Sequence[str
 {_dispatch(ADVANCE, range(stages))}
 {_dispatch(BACK, range(stages, len(symbols)))}
 {entries}
+{block_code(device)}
 {_kernels(threads.runs) if device else _functions(threads.runs)}"""
 
 
@@ -230,7 +233,7 @@ def _kernels(names: Iterable[str]) -> str:
     )
     return declared + "".join(
         f"""
-define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind {{
+define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind "nvvm.maxntid"="{WIDTH}" {{
 {known}  call void @{name}(i64 %thread64, i64 %block64, i64 %width64, ptr %program, i64 %one, i64 %two)
   ret void
 }}"""

@@ -15,14 +15,12 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.compiler import compile_object, require_llvm
 from birthsim_build.code.targets import HOST
 from birthsim_build.code.threads import Threads
 from birthsim_env.extras import installation
 from birthsim_env.physics.rig.values import shown
-
-WIDTH = 32
-"""Threads of a block: a warp."""
 
 ROOM = 64
 """Rows of a thread's memory come in so many, so that loops with the same stages share their code."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.threads import MISSED
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import LAYOUT, ROWS
@@ -33,7 +34,10 @@ def write_header(images: Mapping[str, Words], folder: Path, example: str | None 
 
 def write_kernels(folder: Path) -> None:
     """Write ``kernels.h``, which says how the kernels of a GPU are launched."""
-    (folder / "kernels.h").write_text((HERE / "kernels.h").read_text().replace("@MISSED@", str(MISSED)))
+    text = (HERE / "kernels.h").read_text()
+    for mark, value in (("MISSED", MISSED), ("WIDTH", WIDTH)):
+        text = text.replace(f"@{mark}@", str(value))
+    (folder / "kernels.h").write_text(text)
 
 
 def write_example(folder: Path) -> None:

@@ -5,10 +5,10 @@
  * rows of the data by name: row r of lane i is the double data[r * lanes + i].
  *
  *     birthsim_place   <<<1, 1>>>     (program, data, lanes);     once, and when either has moved
- *     birthsim_begin   <<<blocks, 32>>>(program, starts, count);  episodes begin in count lanes
- *     birthsim_advance <<<blocks, 32>>>(program, periods, 0);     control periods, the last of which closes a policy step
+ *     birthsim_begin   <<<blocks, @WIDTH@>>>(program, starts, count);  episodes begin in count lanes
+ *     birthsim_advance <<<blocks, @WIDTH@>>>(program, periods, 0);     control periods, the last of which closes a policy step
  *
- * with 32 * blocks >= count, or lanes. `starts` is the address of six rows of `count` 64-bit words: lanes; the seed of each; the
+ * with @WIDTH@ * blocks >= count, or lanes; larger blocks fail to launch, since threads of a block share memory. `starts` is the address of six rows of `count` 64-bit words: lanes; the seed of each; the
  * number of its episode, each of which is drawn anew; and three doubles: 0, 0, 0 to begin on the target, or 1 and the place
  * (x, y), m, where to begin. An episode is that of Python with the same seed, bit for bit; its rig is the exported one, not
  * randomised.

@@ -14,7 +14,7 @@ from birthsim_env.gradients import steps
 from birthsim_env.gradients.right_hand_side import EVERY, INPUTS, RIG
 from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant, checked
 

@@ -15,7 +15,8 @@ from birthsim_env.loop.rows import FORCE, MOTION, OPENING, STATE, WORLD
 from birthsim_env.loop.stage import Stage, block, carray, pointer, scratch
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.runge_kutta import STAGES

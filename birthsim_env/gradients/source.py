@@ -13,32 +13,22 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from numba import types
-from numba.extending import intrinsic
-
 from birthsim_env.files import write_text
 from birthsim_env.gradients.graph import Graph, Scalar, Value
+from birthsim_env.physics.compiled.compilation import Late
 from birthsim_env.physics.compiled.kept import cache_folder
 from birthsim_env.physics.compiled.plain import DEBUG
 
-if TYPE_CHECKING or DEBUG:
+if DEBUG:
 
     def choose(condition: bool, yes: float, no: float) -> float:
-        """``yes if condition else no`` of numbers that are at hand, without a branch that LLVM could move loads into."""
+        """``yes if condition else no`` of numbers that are at hand, as ``intrinsics`` has it for machine code."""
         return yes if condition else no
 
+elif TYPE_CHECKING:
+    from birthsim_env.gradients.intrinsics import choose as choose
 else:
-
-    @intrinsic
-    def choose(context, condition, yes, no):
-        """``yes if condition else no`` of numbers that are at hand, without a branch that LLVM could move loads into."""
-        number = types.float64
-
-        def generate(context, builder, signature, arguments):
-            pairs = zip(arguments[1:], signature.args[1:], strict=True)
-            return builder.select(arguments[0], *(context.cast(builder, value, kind, number) for value, kind in pairs))
-
-        return number(types.boolean, yes, no), generate
+    choose = Late("birthsim_env.gradients.intrinsics", "choose")
 
 
 class Straight:

@@ -1,6 +1,6 @@
 """Runge-Kutta steps differentiated: kernels over lanes that walk a tape of states back, or carry a tangent along.
 
-The tape has the state before every step; going back, the three trial states of a step are computed again, with the same bits.
+The tape has the state before every step; going back, the trial states of a step are computed again, with the same bits.
 What ``dynamics.settle`` sets to zero, below 1e-30, counts as if it went on.
 """
 
@@ -12,7 +12,8 @@ from birthsim_env.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
@@ -41,7 +42,7 @@ def lay_out(
             dynamics.copy(x, total, n)
             dynamics.copy(x, trial, n)
         dynamics.stage(x, u, f, p, total, trial, n, weight_of(stage, step), ahead_of(stage, step))
-        dynamics.copy(total if stage == 3 else trial, points[k + 1], n)
+        dynamics.copy(total if stage == STAGES - 1 else trial, points[k + 1], n)
 
 
 @helper

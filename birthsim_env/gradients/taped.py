@@ -14,7 +14,8 @@ from birthsim_env.loop.loop import Loop, Place, load_rows, run_stage, store_rows
 from birthsim_env.loop.stage import Stage, address_of, carray, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 

@@ -7,8 +7,8 @@ the number of lanes nor that of threads changes a bit.
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from functools import cache
-from itertools import groupby
+from functools import cache, partial
+from itertools import chain, groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from birthsim_env.loop.rows import SEEN, TIME, WORLD
 from birthsim_env.loop.stage import Part, Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel, of_numbers
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.plain import DEBUG
 from birthsim_env.physics.dynamics import load, store
@@ -24,6 +25,9 @@ from birthsim_env.physics.dynamics import load, store
 WORTH_A_THREAD = 300
 """Lanes times periods that are worth another thread, which takes about 0.1 ms to set to work; a lane and period takes 0.4 to
 0.9 us."""
+
+MOVE, ENTRY = 4, 7
+"""Whole numbers that describe an array that is moved, and a stage."""
 
 Place = tuple[Array, int]
 """An array (rows, N) and the row of ``World``, or of ``Seen``, at which it stands in a block."""
@@ -57,13 +61,21 @@ def run_stage(stages: NDArray[np.int64], s: int, base: np.int64, start: int, n: 
     return call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
 
 
+MOVES, MOVED, STAGES, STAGED, ROWS, LANES = range(6)
+"""Where the whole numbers that describe a loop stand."""
+
+
 @kernel
-def _run(
-    moves: NDArray[np.int64], stages: NDArray[np.int64], rows: int, lanes: int, periods: int, first: int, last: int
-) -> int:
-    """``moves`` (M, 4): address of an array, its rows, its first row in a block, whether it is written. ``stages`` (S, 7):
-    address of the function; rows at which world, seen and memory begin (-1: none); addresses of constants and tables; 1 for a
-    closing stage."""
+def _run(about: int, periods: int, first: int, last: int) -> int:
+    """At ``about``: address and number of moves, address and number of stages, rows of the space, lanes.
+
+    Moves (M, 4): address of an array, its rows, its first row in a block, whether it is written. Stages (S, 7): address of
+    the function; rows at which world, seen and memory begin (-1: none); addresses of constants and tables; 1 for a closing
+    stage."""
+    told = carray(pointer(about, np.int64), (LANES + 1,))
+    moves = carray(pointer(told[MOVES], np.int64), (told[MOVED], MOVE))
+    stages = carray(pointer(told[STAGES], np.int64), (told[STAGED], ENTRY))
+    rows, lanes = told[ROWS], told[LANES]
     space, missed = np.empty((rows, BLOCK)), 0
     base = np.int64(space.ctypes.data)
     for start in range(first, last, BLOCK):
@@ -117,8 +129,11 @@ class Loop:
             self._tables.append(about)
             places = (0 if stage.sees_world else -1, WORLD, memory)
             entries.append((address_of(stage.function), *places, stage.constants.ctypes.data, about.ctypes.data, closes))
-        self._moves = np.array(moves, dtype=np.int64).reshape(-1, 4)
-        self._stages = np.array(entries, dtype=np.int64).reshape(-1, 7)
+        self._moves = np.array(moves, dtype=np.int64).reshape(-1, MOVE)
+        self._stages = np.array(entries, dtype=np.int64).reshape(-1, ENTRY)
+        described_by = ((table.ctypes.data, len(table)) for table in (self._moves, self._stages))
+        self._about = np.array([*chain.from_iterable(described_by), self._rows, lanes], dtype=np.int64)
+        self._work: Callable[[int, int, int], int] = partial(of_numbers(_run), self._about.ctypes.data)
 
     def _move(self, array: Array, row: int) -> tuple[int, int, int, int]:
         if array.dtype != np.float64 or not array.flags.c_contiguous or array.ndim != 2 or array.shape[1] != self._lanes:
@@ -135,6 +150,8 @@ class Loop:
         """The sum of ``work(periods, first, last)`` over lanes from ``first`` to ``last``, spread over threads."""
         blocks = -(-self._lanes // BLOCK)
         parts = 1 if DEBUG else max(1, min(threads, blocks, self._lanes * periods // WORTH_A_THREAD))
+        if parts == 1:
+            return work(periods, 0, self._lanes)
         edges = [BLOCK * (blocks * k // parts) for k in range(parts)] + [self._lanes]
         # What runs in a thread holds this loop, and with it the arrays that it knows by address.
         waiting = [_pool(os.getpid(), parts - 1).submit(work, periods, edges[k], edges[k + 1]) for k in range(1, parts)]
@@ -145,7 +162,7 @@ class Loop:
         return missed + sum(one.result() for one in waiting)
 
     def _between(self, periods: int, first: int, last: int) -> int:
-        return int(_run(self._moves, self._stages, self._rows, self._lanes, periods, first, last))
+        return self._work(periods, first, last)
 
 
 def sampled(stage: Stage, time: Array, first: int, count: int) -> Array:

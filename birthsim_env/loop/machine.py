@@ -7,10 +7,9 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-__all__ = ["call", "carray", "pointer"]
+from birthsim_env.loop.stage import ARGUMENTS
 
-ARGUMENTS = 7
-"""Of a stage."""
+__all__ = ["call", "carray", "pointer"]
 
 if TYPE_CHECKING:
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.records import Rows
 
 _STAGES: list[tuple[Callable[..., int], Sequence[type[Rows] | None]]] = []

@@ -13,23 +13,28 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from birthsim_env.loop import plain
-from birthsim_env.physics.compiled.compilation import BLOCK, helper
+from birthsim_env.physics.compiled import prebuilt
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import Late, helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.plain import DEBUG
-from birthsim_env.physics.compiled.record_types import block_type
 from birthsim_env.physics.compiled.records import Rows
 from birthsim_env.physics.compiled.stack import scratch
 
-if TYPE_CHECKING or not DEBUG:
+if TYPE_CHECKING:
     from birthsim_env.loop.machine import call, carray, pointer
-else:
+elif DEBUG:
     from birthsim_env.loop.plain import call, carray, pointer
+else:
+    call, carray, pointer = (Late("birthsim_env.loop.machine", name) for name in ("call", "carray", "pointer"))
 
 __all__ = ["call", "carray", "pointer", "scratch"]
+
+ARGUMENTS = 7
+"""Of a stage."""
 
 TABLE = 5
 """Whole numbers that describe a table: its address and up to four dimensions."""
@@ -116,10 +121,9 @@ def compiled(stage: Any) -> Any:
     """What Numba made of a stage; compiled when it is first asked for. ``RuntimeError`` where kernels are plain Python."""
     if DEBUG:
         raise RuntimeError("BIRTHSIM_DEBUG = 1: nothing is compiled; allowed: to build, and to use a device, without it")
-    arguments = tuple(block_type(layout) if layout else types.int64 for layout in layouts_of(stage))
-    if arguments not in stage.overloads:
-        stage.compile(types.int64(*arguments))
-    return stage.overloads[arguments]
+    from birthsim_env.physics.compiled.with_numba import compiled_stage  # late: prebuilt code needs none of it
+
+    return compiled_stage(stage, layouts_of(stage))
 
 
 @cache
@@ -127,6 +131,8 @@ def address_of(stage: Any) -> int:
     """Where the machine code of a stage begins; where kernels are plain Python, a number that stands for it."""
     if DEBUG:
         return plain.address_of(stage, layouts_of(stage))
+    if place := prebuilt.address(stage, ARGUMENTS):
+        return place
     made = compiled(stage)
     return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
 

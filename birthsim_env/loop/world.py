@@ -2,6 +2,7 @@
 
 from functools import cache
 
+from birthsim_env.loop.integration import integrate
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, scratch, table2
@@ -45,7 +46,7 @@ def _tick(world: World, seen: Seen, period: float, n: int) -> None:
 def _move(world: World, seen: Seen, u: Array, clock: Clock, n: int) -> None:
     """One control period under openings ``u`` (4, n)."""
     x, p, steps = world.state, world.rig, int(clock.steps)
-    dynamics.integrate(x, u, world.force, p, steps, clock.period / steps, world.impact, n)
+    integrate(x, u, world.force, p, steps, clock.period / steps, world.impact, n)
     dynamics.settle(x, n)
     _tick(world, seen, clock.period, n)
     end_effector_motion(x[:, :n], p[:, :n], world.motion.rows[:, :n])

@@ -9,13 +9,16 @@ import math
 
 from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK, WARP
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.shared import anew
 from birthsim_env.physics.compiled.stack import column, scratch
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.step import STEP
 
-INTEGRATION_STEP = 0.25e-3
-"""s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
+INTEGRATION_STEP = STEP.seconds
+"""s. The longest step of the Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
 
 
 @helper
@@ -296,7 +299,7 @@ def steps_in(time: float) -> int:
 
 @helper
 def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, n: int) -> None:
-    """Integrates ``n`` lanes of a state ``x`` by ``steps`` classical Runge-Kutta steps of ``step`` s under constant inputs.
+    """Integrates ``n`` lanes of a state ``x`` by ``steps`` Runge-Kutta steps of ``step`` s under constant inputs.
 
     ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop.
     """
@@ -306,17 +309,21 @@ def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, i
     copy(x, trial, n)
     for _ in range(steps):
         for k in range(STAGES):
-            if k < STAGES - 1:
-                stage(before, u, f, p, total, trial, n, weight_of(k, step), ahead_of(k, step))
+            own = anew(p)
+            if k < STAGES - 1 or WARP:
+                stage(before, u, f, own, total, trial, n, weight_of(k, step), ahead_of(k, step))
             else:
-                last_stage(before, u, f, p, total, trial, n, weight_of(k, step))
+                last_stage(before, u, f, own, total, trial, n, weight_of(k, step))
+        if WARP:  # with one right-hand side, since two of them are too long for a thread's instructions to stay at hand
+            copy(total, before, n)
+            copy(total, trial, n)
         record_impacts(total, p, impacts, n)
     copy(total, x, n)
 
 
 @kernel
 def advance(state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array) -> None:
-    """Integrates ``state`` in place by classical Runge-Kutta.
+    """Integrates ``state`` in place by Runge-Kutta.
 
     ``forces`` (K, 2, N): each of the K samples is held for ``steps`` steps of ``step`` seconds. ``impacts`` (2, N) gets
     the largest speed at which each piston ran into an end stop.

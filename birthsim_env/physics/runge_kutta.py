@@ -1,17 +1,12 @@
-"""The classical Runge-Kutta method, stage by stage."""
+"""The plant's Runge-Kutta method: the classical one, or Ralston's where ``BIRTHSIM_STEP`` asks for it."""
 
-from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.step import METHOD
 
-STAGES = 4
-
-
-@helper
-def weight_of(stage: int, step: float) -> float:
-    """What the rates of a stage count for at the end of the step, s."""
-    return step / 6.0 if stage == 0 or stage == 3 else step / 3.0
-
-
-@helper
-def ahead_of(stage: int, step: float) -> float:
-    """How far a stage's rates take the next trial state, s."""
-    return 0.0 if stage == 3 else step if stage == 2 else step / 2.0
+if METHOD == "rk3":
+    from birthsim_env.physics.ralston import STAGES as STAGES
+    from birthsim_env.physics.ralston import ahead_of as ahead_of
+    from birthsim_env.physics.ralston import weight_of as weight_of
+else:
+    from birthsim_env.physics.classical import STAGES as STAGES
+    from birthsim_env.physics.classical import ahead_of as ahead_of
+    from birthsim_env.physics.classical import weight_of as weight_of

@@ -27,6 +27,7 @@ before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, 
 
 _SCHEMA = {
     "date": str, "commit": str, "seconds": float, "settings": dict, "figures": (dict, list), "sources": Each((str, dict)),
+    "used?": Each(str),
 }  # fmt: skip
 MOST = 2**26
 """Bytes of a result; the largest has a million."""
@@ -78,7 +79,7 @@ def changed(content: Content, functions: Iterable[Callable[..., Any]]) -> list[s
     then = content["sources"]
     if "used" not in content:
         return [path for path, code in then.items() if not os.path.isfile(ROOT / path) or source(ROOT / path).code != code]
-    known = {f"{file}:{name}": code for file, names in then.items() for name, code in names.items()}
+    known = {f"{file}:{name}": code for file, names in then.items() if isinstance(names, dict) for name, code in names.items()}
     return [place for place, code in _called(functions, content["used"]).items() if known.get(place) != code]
 
 

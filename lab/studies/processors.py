@@ -1,10 +1,19 @@
-"""Runs the numeric tests as other processors would: ``make portable``.
+"""Runs the tests of bits as other processors would: ``make portable``.
 
 Kernels are compiled for each, with a cache of its own; PyTorch, NumPy, OpenBLAS, oneDNN and the C library are held back to the
 same instructions. What this machine's processor lacks is left out, and said. A setting can also be taken alone:
     python -m lab.studies.processors x86-64                      its tests
     python -m lab.studies.processors x86-64 -- COMMAND ...       any command under it
-    python -m lab.studies.processors here                        the numeric tests on this processor as it is: ``make oldest``
+    python -m lab.studies.processors here                        the tests of bits with Numba as it is: ``make oldest``
+
+What depends on a processor is the bits of machine code, so what is tested is bits, and the rest follows from them: equal bits
+pass every other test as they do in ``make test``. Stored fingerprints are of all scenarios and controllers, three lanes at a
+time, which is less than a vector register has; that a lane of many has the bits of one alone leads from there to vectors, for
+every law, sensor, hand, impedance and option. Elementary functions are compared with plain Python. Refusals, files, commands
+and statistics are not repeated: they have no machine code, or hold for these bits.
+
+As ``avx2`` the library that comes with the package runs; all other settings have Numba compile, as after an edit. ``here``
+also runs what asks the most of Numba's interface, which its versions change: users' own stages and generated code.
 """
 
 import os
@@ -19,8 +28,17 @@ from llvmlite.binding import get_host_cpu_features
 from numpy._core import _multiarray_umath  # type: ignore[attr-defined]
 
 ROOT = Path(__file__).resolve().parents[2]
-NUMERIC = [f"tests/{room}" for room in ("oracles", "physics", "estimation", "contracts")]
-"""Rooms whose tests depend on the bits of machine code, or on what LLVM makes of it; contracts run every law."""
+CONTRACTS = "tests/contracts/test_"
+BITS = [
+    "tests/oracles/test_golden.py",
+    "tests/physics/compiled/test_exact.py",
+    f"{CONTRACTS}controllers.py::test_one_rig_is_a_lane_of_many_and_a_reset_starts_it_alone",
+    f"{CONTRACTS}environments.py::test_a_lane_is_the_environment_alone_through_its_episodes",
+]
+INTERFACE = [
+    *("tests/physics/compiled", "tests/gradients/test_tracing.py", "tests/gradients/test_loop.py"),
+    *(f"{CONTRACTS}own_parts.py", f"{CONTRACTS}own_callables.py", f"{CONTRACTS}extensions.py", f"{CONTRACTS}copies.py"),
+]
 
 _HASWELL = [
     *("sse", "sse2", "sse3", "ssse3", "sse4.1", "sse4.2", "popcnt", "avx", "avx2"),
@@ -28,8 +46,15 @@ _HASWELL = [
 ]
 _SKYLAKE = [*_HASWELL, "avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"]
 
+SHIPPED = "avx2"
+"""The setting as which the library of the package runs; it has x86-64-v3 code."""
+
+NUMBA = {"BIRTHSIM_PREBUILT": "0"}
+"""Has Numba compile what the library has too."""
+
 WARM = [sys.executable, "-m", "tests.warming"]
-TESTS = [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", *NUMERIC]
+# Policies have one law and one network's code in common: the contract of ``residual`` is theirs.
+TESTS = [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", "-k", "not policy", *BITS]
 
 
 @dataclass(frozen=True)
@@ -56,6 +81,7 @@ class Processor:
         dispatched = {name for name, used in _multiarray_umath.__cpu_features__.items() if used}
         dispatched &= set(_multiarray_umath.__cpu_dispatch__)
         return {
+            "BIRTHSIM_PREBUILT": "0",
             "NUMBA_CPU_NAME": self.llvm,
             "NUMBA_CPU_FEATURES": ",".join(f"+{feature}" for feature in self.features),
             "NUMBA_CACHE_DIR": str(ROOT / "out" / "processors" / name),
@@ -64,6 +90,7 @@ class Processor:
             "ATEN_CPU_CAPABILITY": self.torch,
             "OPENBLAS_CORETYPE": self.openblas,
             "ONEDNN_MAX_CPU_ISA": self.onednn,
+            **({} if name == SHIPPED else NUMBA),
         }
 
 
@@ -94,8 +121,8 @@ def main() -> None:
             continue
         print(f"== as {name}", flush=True)
         began = time.monotonic()
-        environment = {**os.environ, **(processor.environment(name) if processor else {})}
-        lines = [command.split()] if command else [WARM, TESTS]
+        environment = {**os.environ, **(processor.environment(name) if processor else NUMBA)}
+        lines = [command.split()] if command else [WARM, TESTS if processor else [*TESTS, *INTERFACE]]
         status = next(filter(None, (subprocess.run(line, cwd=ROOT, env=environment).returncode for line in lines)), 0)
         failed = failed or status != 0
         verdict = "passed" if status == 0 else f"FAILED ({status})"

@@ -58,13 +58,13 @@ def test_a_measurement_says_everything(found):
         falling = np.array(rows, dtype=float)[:, 0]
         assert np.all(np.diff(falling) < 0), "smaller steps, smaller errors"
         assert measured["reference_itself"]["position_m"] < 0.1 * falling[2]
-    assert found["smooth"]["orders"][accuracy.SHIPPED][0] == pytest.approx(4, abs=0.25)
+    assert found["smooth"]["orders"][accuracy.SHIPPED][0] == pytest.approx(accuracy.EVALUATIONS[accuracy.SHIPPED], abs=0.25)
 
 
 def test_tables_show_the_plants_row_and_what_is_unstable(found, tmp_path):
     text = accuracy_tables.tables(found)
     assert 'Motion "strong", 3 of 4 rigs' in text
-    assert text.count("**Runge-Kutta 4, the plant's**") == 2
+    assert text.count(f"**{accuracy.SHIPPED}, the plant's**") == 2
     position, pressure, rig = accuracy_tables.worst(found, "strong")
     assert 1e-9 < position < 5e-7
     assert 1e-9 < pressure < 5e-6

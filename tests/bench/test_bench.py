@@ -42,9 +42,10 @@ def test_what_a_checkout_cannot_do_ends_the_measurement():
 
 
 @pytest.mark.slow
-def test_first_steps_compile_once():
+def test_first_steps_compile_once(monkeypatch):
+    monkeypatch.setattr(speed, "LAWS", LAWS[:1])
     seconds = dict(speed.first_steps())
     names = [name.removesuffix(", compiled") for name in seconds if name.endswith(", compiled")]
-    assert len(names) == 1 + len(LAWS)
+    assert len(names) == 2
     assert seconds["valve mode, compiled"] > 3.0 * seconds["valve mode, cached"]
     assert all(seconds[f"{name}, cached"] < seconds["valve mode, compiled"] for name in names)

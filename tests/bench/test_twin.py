@@ -5,7 +5,7 @@ import pytest
 
 from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled.lanes import HALF_L1, HALF_L2, V1, V2, Y1, Y2
-from birthsim_env.physics.dynamics import INTEGRATION_STEP
+from birthsim_env.physics.dynamics import INTEGRATION_STEP, steps_in
 from lab.studies.speed.twin import PLAIN, Twin, has_compiler
 
 pytestmark = pytest.mark.skipif(not has_compiler(), reason="no gcc")
@@ -39,7 +39,7 @@ def test_the_twin_is_the_plant_but_for_rounding(twin, law):
         command = rng.uniform(-1.0, 1.0, (4, LANES))
         forces = rng.uniform(-150.0, 150.0, (10, 2, LANES))
         plant.advance(command, forces, 0.01)
-        twin.advance(state, command, forces, plant.lane_parameters, 4, INTEGRATION_STEP, impacts)
+        twin.advance(state, command, forces, plant.lane_parameters, steps_in(1e-3), INTEGRATION_STEP, impacts)
         scale = np.maximum(np.abs(plant.state).max(axis=1, keepdims=True), 1e-30)
         assert np.abs((state - plant.state) / scale).max() < ROUNDING
         np.testing.assert_allclose(impacts, plant.impacts, rtol=0.0, atol=ROUNDING)

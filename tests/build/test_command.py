@@ -44,7 +44,7 @@ law_part("residual:circle", Parameters(), False)
 def test_laws_need_nothing_that_trains_policies():
     done = subprocess.run([sys.executable, "-c", WITHOUT_POLICIES], capture_output=True, text=True, check=False)
     assert int(done.stdout) > 1
-    assert done.stderr.rstrip().endswith("a policy needs the extra: pip install -e '.[agents]' in a clone")
+    assert done.stderr.rstrip().endswith("residual needs pip install -e '.[agents]' in a clone")
 
 
 def test_kernels_and_programs(tmp_path, monkeypatch, capsys):

@@ -9,7 +9,8 @@ import pytest
 from llvmlite.binding import llvm_version_info
 
 from baselines.named import compiled_names
-from birthsim_build.code import threads
+from birthsim_build.code import ptx, threads
+from birthsim_build.code.blocks import SHARED, WIDTH
 from birthsim_build.code.compiler import LEAST_LLVM, compile_object
 from birthsim_build.device.export import write_programs
 from birthsim_build.device.lanes import Lanes
@@ -20,11 +21,13 @@ from birthsim_build.layout import LAYOUT
 from birthsim_env import Parameters, registry
 from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
+from birthsim_env.physics.compiled.lanes import PARAMETERS
+from tests.build.ptx_loops import functions_in, loops_in, memory_of
 from tests.build.targets import assert_fusing_changes_nothing, fill, need_threads
 
 SEED = 2_000_000
-WAY = "birthsim_env.parts.references:_path"
-LOOKS = {"baselines.bench.measures:_see", "baselines.bench.measures:_pay"}
+WAY, PLANTS = "birthsim_env.parts.references:_path", "birthsim_env.loop.world"
+LOOKS = {"baselines.bench.measures:_measure", "baselines.bench.measures:_reward"}
 """What measures an evaluation."""
 
 
@@ -65,11 +68,18 @@ def assert_exact(text):
     assert re.search(r"\bfma|\.approx|\.full\b|\.ftz\b|\.extern|\bmad\.[a-z.]*f", text) is None
 
 
-def test_ptx_is_exact(tmp_path):
+@pytest.fixture(scope="module", params=["_plant", pytest.param("_worn_plant", marks=pytest.mark.slow)])
+def code(request, tmp_path_factory):
+    """Where the PTX of a target and of a plant is."""
     if llvm_version_info[0] < LEAST_LLVM:
         pytest.skip("needs LLVM 22")
-    compile_object([WAY], "ptx", tmp_path / "code.o", threads=threads.Threads(512))
-    assert_exact((tmp_path / "code.ptx").read_text())
+    folder = tmp_path_factory.mktemp("ptx")
+    compile_object([WAY, f"{PLANTS}:{request.param}"], "ptx", folder / "code.o", threads=threads.Threads(512))
+    return folder / "code.ptx"
+
+
+def test_ptx_is_exact(code):
+    assert_exact(code.read_text())
 
 
 WRONG = (
@@ -82,6 +92,62 @@ WRONG = (
 def test_what_is_not_exact_is_found(wrong):
     with pytest.raises(AssertionError):
         assert_exact(f"mul.rn.f64 %fd1, %fd2, %fd3;\n{wrong}")
+
+
+ROOTS = 9
+"""Of a right-hand side: one of the linkage, and one of each way through a valve."""
+
+TWO_LOOPS = """
+.func (.param .b64 func_retval0) one(
+	.param .b64 one_param_0
+)
+{
+	ld.param.b64 	%rd1, [one_param_0];
+$L__BB0_1:
+	ld.global.b64 	%rd2, [%rd1];
+	bra.uni 	$L__BB0_3;
+$L__BB0_2:
+	st.b64 	[%rd1], %rd2;
+	@%p2 bra 	$L__BB0_1;
+	bra.uni 	$L__BB0_4;
+$L__BB0_3:
+	sqrt.rn.f64 	%rd2, %rd2;
+	@%p1 bra 	$L__BB0_3;
+	@%p3 bra 	$L__BB0_2;
+$L__BB0_4:
+	st.local.b64 	[%SPL], %rd2;
+	ret;
+}
+"""
+
+
+def test_loops_are_found_with_the_memory_that_they_access():
+    inner, outer = loops_in(functions_in(TWO_LOOPS)["one"])
+    assert (memory_of(inner), len(inner)) == ({}, 2)
+    assert memory_of(outer) == {"ld.global": 1, "st.generic": 1}
+
+
+def test_steps_of_integration_access_no_memory_but_what_a_block_shares(code):
+    """The state is in registers; a right-hand side reads a parameter at most once, and neighbouring threads other banks."""
+    text = code.read_text()
+    found = [one for one in loops_in(functions_in(text)["advance_one"]) if sum("sqrt.rn" in line for line in one) >= ROOTS]
+    assert found
+    for loop in found:
+        accessed, roots = memory_of(loop), sum("sqrt.rn" in line for line in loop)
+        assert accessed.keys() == {"ld.shared"}
+        assert 40 < accessed["ld.shared"] * ROOTS / roots <= PARAMETERS
+    assert re.findall(r"\.shared .*\[(\d+)\]", text) == [str(SHARED)]
+    assert SHARED < 48 * 1024
+    column = r"(?:ld|st)\.shared\.b64 .*\[%rd\d+(?:\+(\d+))?\]"
+    assert {int(row or 0) for row in re.findall(column, text)} == set(range(0, SHARED, 8 * WIDTH))
+
+
+def test_registers_hold_nearly_all_of_a_state(code, tmp_path):
+    if ptx.assembler() is None:
+        pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
+    taken = ptx.assemble(code, tmp_path / "code.cubin", "sm_90")
+    assert taken["shared"] == SHARED
+    assert 0 < taken["spilled"] < 512
 
 
 CASES = {

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -104,6 +105,24 @@ def test_a_link_leads_no_cleaning_elsewhere(tmp_path):
     with own_folder(tmp_path / "out"), pytest.raises(ValueError, match=r"\.birthsim' is no folder; allowed: "):
         write_text(tmp_path / "out" / "b.txt", "b")
     assert names(tmp_path / "elsewhere") == left
+
+
+@pytest.mark.parametrize("last", [1, 2, 3, 4])
+def test_another_writer_may_remove_the_folder_between_any_two_looks(tmp_path, monkeypatch, last):
+    look, looks = Path.stat, []
+
+    def removes(path, **how):
+        found = look(path, **how)
+        if path.name == HIDDEN:
+            looks.append(path)
+            if len(looks) == last:
+                path.rmdir()
+        return found
+
+    (tmp_path / HIDDEN).mkdir()
+    monkeypatch.setattr(Path, "stat", removes)
+    write_text(tmp_path / "a.txt", "a")
+    assert (tmp_path / "a.txt").read_text() == "a"
 
 
 def test_what_another_host_made_stays_for_a_week(tmp_path, monkeypatch):

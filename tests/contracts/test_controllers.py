@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import itertools
 import math
 
 import gymnasium
@@ -21,8 +22,11 @@ FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
 POLICIES = [f"residual[policy={name}]" for name in names("policy")]
 CHOICES = [name for name in names("controller") if name != "admittance"]  # which is admittance-adaptive
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
-NAMES = [*CHOICES, IDENTIFIED, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
-CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name in NAMES for sensors in names("sensors")]
+LAWS = [*CHOICES, IDENTIFIED, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
+NAMES = [*LAWS, *POLICIES]
+# The code of a policy is that of ``residual``: what differs are its weights and the law inside.
+PAIRS = [*itertools.product(LAWS, names("sensors")), *zip(POLICIES, itertools.cycle(names("sensors")), strict=False)]
+CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name, sensors in PAIRS]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 CONTROLLED = [name for name in NAMES if name not in uncontrolled_names()]
 

@@ -230,5 +230,5 @@ FIELDS = {
 def test_parameters(changes):
     run_a_little(RIG)
     names = (name.rpartition(".")[2] for name in changes)
-    with watched(*names, "k1", "dead_volume", "mass", "policy_period", memory=CALLING):
+    with watched(*names, "reference", "k1", "dead_volume", "mass", "policy_period", memory=CALLING):
         run_a_little(RIG.replace(changes))

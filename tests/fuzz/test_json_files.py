@@ -59,11 +59,28 @@ def evaluated():
     return content
 
 
+RESULT = {
+    "command": "birthsim study stiffest",
+    "commit": "3aeb44ec4468e384e2b6d31c53c293c3f4f9a02a",
+    "dirty": False,
+    "date": "2026-11-26T08:36:37+00:00",
+    "versions": {"python": "3.11.7", "numpy": "2.4.6"},
+    "used": {"controller=pid": "baselines.rivals.pid"},
+    "sources": {"birthsim_env/state.py": {"take_state": "9eeb256a93e6", "give_state": "02a98f0e4b17"}},
+    "seconds": 21.3,
+    "settings": {"sampled": True},
+    "units": {"controller": "", "mass": "kg"},
+    "figures": [["backstepping", 1.5], ["pid", 0.002]],
+}
+"""Not a stored one, as each of these changes with many commits."""
+OLDER = {name: value for name, value in RESULT.items() if name != "used"}
+
 READERS = {
     "training.json": (training, lambda: json.loads((policy_folders("probe")[0] / "training.json").read_text(encoding="utf-8"))),
     "evaluation.json": (evaluation, evaluated),
     "entry.json": (entry, evaluated),
-    "stiffest.json": (result, lambda: read_result("stiffest")),
+    "result.json": (result, lambda: RESULT),
+    "result_of_files.json": (result, lambda: {**OLDER, "sources": {"birthsim_env/state.py": "9eeb256a93e6"}}),
 }
 
 

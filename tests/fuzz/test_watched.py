@@ -1,16 +1,23 @@
 """The checker itself sees every misbehaviour, and its own damage damages."""
 
 import os
+import sys
+from importlib import import_module
 from itertools import repeat
 
 import numpy as np
 import pytest
 from hypothesis import find
 
+from birthsim_env.gradients import tracing
 from birthsim_env.physics.rig.values import LONGEST, shown
 from tests.fuzz import watched as watching
 from tests.fuzz.strategies import altered, damaged, nested
 from tests.fuzz.watched import TooSlow, watched
+
+
+def doubled(value):
+    return 2 * value
 
 
 def raises(error):
@@ -49,6 +56,23 @@ def test_what_works_and_what_is_refused_clearly_pass():
     with watched("argument") as example:
         raise CLEAR
     assert example.refused == str(CLEAR)
+
+
+def test_a_module_may_be_imported_for_the_first_time(tmp_path, monkeypatch):
+    """In a new clone no module is compiled; which of a lot of examples imports it first, chance decides."""
+    (tmp_path / "late_module.py").write_text("X = 1\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    with watched("argument", runs_code=True):
+        assert import_module("late_module").X == 1
+    assert list((tmp_path / "__pycache__").glob("late_module*"))
+
+
+def test_the_package_may_make_code_once_in_a_process(monkeypatch):
+    """Functions are rewritten for gradients when a controller is first made, in whichever example that is."""
+    monkeypatch.setattr(tracing, "_REWRITTEN", {})
+    with watched("argument"):
+        assert tracing.rewritten(doubled)(2) == 4
 
 
 def test_any_value_is_shown_in_a_short_line():

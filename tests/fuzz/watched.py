@@ -33,8 +33,8 @@ DEEDS = {
 }
 """Audit events that no reading of a file causes."""
 
-CODE = (str(ROOT), sys.prefix, sys.base_prefix, "<frozen", "<string>", "<__array")
-"""Where code that may run comes from."""
+CODE = (str(ROOT), sys.prefix, sys.base_prefix, "<frozen", "<string>", "<__array", "<traced ")
+"""Where code that may run comes from; of the package itself what ``gradients.tracing`` makes, once a process."""
 
 cases = settings(max_examples=settings.default.max_examples // 10, suppress_health_check=list(HealthCheck))
 """Examples of one kind: 10 in the profile ``quick``, 400 in ``slow``, 5,000 in ``deep``."""
@@ -69,7 +69,7 @@ def watched(*names, runs_code=False, memory=MEMORY):
         except (ValueError, TypeError) as error:
             example.refused, fault = str(error), unclear(error, example.names)
         assert not fault, f"{fault}: {example.refused[:3000]}"
-        assert example.deeds == []
+        assert not example.deeds, example.deeds
 
 
 def unclear(error, names):
@@ -140,5 +140,5 @@ def _deed(event, arguments, example):
 
 
 def _is_own(path, example):
-    """Whether a path is in the example's folder, or in the cache of compiled kernels."""
-    return str(path).startswith((str(example.folder), os.devnull, str(cache_folder())))
+    """Whether a path is in the example's folder, or in a cache: of compiled kernels, or of modules that are imported late."""
+    return "__pycache__" in str(path) or str(path).startswith((str(example.folder), os.devnull, str(cache_folder())))

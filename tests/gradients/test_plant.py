@@ -10,7 +10,7 @@ import pytest
 from birthsim_env.gradients.plant import Derivatives, jvp, vjp
 from birthsim_env.gradients.right_hand_side import INPUTS, RIG, made
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from lab.studies.gradients.states import SCALES, plant_of
 

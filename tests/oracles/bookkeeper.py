@@ -11,6 +11,8 @@ from birthsim_env.physics.rig.parameters import Parameters
 R, GAMMA, WALL = 287.05, 1.4, 293.15
 CV, CP = R / (GAMMA - 1), GAMMA * R / (GAMMA - 1)
 P, T = list(PRESSURES), list(TEMPERATURES)
+KEEPING = 0.25e-3
+"""s: the step of what keeps its own books."""
 OTHER = [1, 0, 3, 2]
 """Chambers P1, N1, P2, N2; heat passes through the piston to the other chamber of the same cylinder."""
 

@@ -7,7 +7,7 @@ from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles.bookkeeper import GAMMA, Bookkeeper, P, Volumes
+from tests.oracles.bookkeeper import GAMMA, KEEPING, Bookkeeper, P, Volumes
 
 RIG = Parameters()
 
@@ -33,7 +33,7 @@ def gap(step: float, collide: bool) -> float:
 
 @pytest.mark.parametrize("collide", [False, True], ids=["clear of the stops", "through the stops"])
 def test_the_books_close_with_the_fourth_order_of_the_step(collide: bool) -> None:
-    coarse, fine = (gap(factor * INTEGRATION_STEP, collide) for factor in ((1, 0.5) if collide else (2, 1)))
+    coarse, fine = (gap(factor * KEEPING, collide) for factor in ((1, 0.5) if collide else (2, 1)))
     assert fine < 1e-7
     assert coarse > 8 * fine
 
@@ -49,7 +49,7 @@ def test_insulated_shut_chambers_keep_their_adiabat() -> None:
         invariants.append(plant.state[P] * volumes[-1] ** GAMMA)
         plant.advance(np.zeros((4, 1)), np.array([[150 * np.sin(np.pi * (k + 0.5) / 50)], [0.0]]), 0.02)
     assert (np.max(volumes, axis=0) / np.min(volumes, axis=0)).max() > 1.2
-    np.testing.assert_allclose(np.array(invariants) / invariants[0], 1.0, rtol=1e-9)
+    np.testing.assert_allclose(np.array(invariants) / invariants[0], 1.0, rtol=3e-9)
 
 
 def mechanical_gap(step: float) -> float:

@@ -5,10 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2
-from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles.bookkeeper import WALL, Bookkeeper, P, T, Volumes, mass_and_energy
+from tests.oracles.bookkeeper import KEEPING, WALL, Bookkeeper, P, T, Volumes, mass_and_energy
 
 FIXED = {"valves.leakage_ratio": 0.0, "mechanics.mass": 1e18, "mechanics.gravity": 0.0}
 """Pistons that do not move: their mass is out of reach of the pressures."""
@@ -18,7 +17,7 @@ FIXED = {"valves.leakage_ratio": 0.0, "mechanics.mass": 1e18, "mechanics.gravity
 def test_mass_and_energy_balance_over_ten_seconds() -> None:
     """Lane by lane other valve motions and pushes, a hand's spring keeping clear of the stops; every chamber's books close."""
     lanes, rng, rig = 6, np.random.default_rng(0), Parameters()
-    keeper, check = Bookkeeper(rig, lanes, INTEGRATION_STEP), Plant(rig, lanes)
+    keeper, check = Bookkeeper(rig, lanes, KEEPING), Plant(rig, lanes)
     centre, worst, reached = check.end_effector()[:2], np.zeros(2), []
     for k in range(500):
         if k % 10 == 0:
@@ -36,9 +35,9 @@ def test_mass_and_energy_balance_over_ten_seconds() -> None:
 
 
 def test_balances_hold_through_collisions_with_the_end_stops() -> None:
-    """A stop is the fastest event of all; half the default step resolves it to the figure of the balance above."""
+    """A stop is the fastest event of all; half the usual step resolves it to the figure of the balance above."""
     lanes, rng = 36, np.random.default_rng(1)
-    keeper, worst, deepest = Bookkeeper(Parameters(), lanes, INTEGRATION_STEP / 2), np.zeros(2), np.zeros((2, lanes))
+    keeper, worst, deepest = Bookkeeper(Parameters(), lanes, KEEPING / 2), np.zeros(2), np.zeros((2, lanes))
     outward = rng.choice([-1.0, 1.0], (2, lanes))
     keeper.plant.state[[Y1, Y2]], keeper.plant.state[[V1, V2]] = outward * [[0.08], [0.17]], 0.6 * outward
     keeper.ledger = mass_and_energy(keeper.rig, keeper.plant.state)

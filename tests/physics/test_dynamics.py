@@ -5,10 +5,12 @@ import pytest
 
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.step import METHOD
 from lab.studies.accuracy import second_model
 from lab.studies.accuracy.second_model import SecondModel
 from tests.physics.rigs import DEMANDING, LAWS, MOVED, OTHER
@@ -85,13 +87,22 @@ def classical(plant: Plant, command: Array, push: Array, step: float) -> Array:
     return x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
-def test_a_step_is_the_classical_runge_kuttas_in_every_lane() -> None:
+def ralstons(plant: Plant, command: Array, push: Array, step: float) -> Array:
+    """One step of third order, as Ralston has it."""
+    x = plant.state.copy()
+    k1 = plant.derivatives(x, command, push)
+    k2 = plant.derivatives(x + step / 2 * k1, command, push)
+    k3 = plant.derivatives(x + 3 * step / 4 * k2, command, push)
+    return x + step / 9 * (2 * k1 + 3 * k2 + 4 * k3)
+
+
+def test_a_step_is_the_textbooks_in_every_lane() -> None:
     """More lanes than a block has, two samples of the push, two steps each."""
     plant, command, push = anywhere(Parameters().replace(MOVED), BLOCK + 3, 4)
-    start, step = plant.state.copy(), 1e-5
+    start, step, textbook = plant.state.copy(), 1e-5, {"rk4": classical, "rk3": ralstons}[METHOD]
     for sample in (push, -push):
         for _ in range(2):
-            plant.state = classical(plant, command, sample, step)
+            plant.state = textbook(plant, command, sample, step)
     expected = plant.state.copy()
     plant.state = start
     plant.impacts[:] = np.nan
@@ -132,7 +143,11 @@ def test_what_has_decayed_becomes_zero_and_nothing_else_does() -> None:
 
 
 @pytest.mark.parametrize(
-    ("time", "steps"), [(0.25e-3, 1), (1e-3, 4), (0.26e-3, 2), (0.1e-3, 1), (1e-12, 1), (0.25e-3 * (1 + 1e-12), 1)]
+    ("times", "steps"), [(1.0, 1), (4.0, 4), (1.04, 2), (0.4, 1), (1e-9, 1), (1 + 1e-12, 1), (3 - 1e-12, 3)]
 )
-def test_steps_are_no_longer_than_the_default(time: float, steps: int) -> None:
-    assert dynamics.steps_in(time) == steps
+def test_steps_are_no_longer_than_the_default(times: float, steps: int) -> None:
+    assert dynamics.steps_in(times * INTEGRATION_STEP) == steps
+
+
+def test_a_control_period_has_a_whole_number_of_the_default() -> None:
+    assert dynamics.steps_in(1e-3) * INTEGRATION_STEP == pytest.approx(1e-3, rel=1e-15)

@@ -15,6 +15,7 @@ from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y2, Z1, Z2
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.step import STEP
 from lab.studies.accuracy.second_model import plastic_fraction
 from tests.physics.rigs import LAWS, NO_FRICTION
 from tests.physics.test_dynamics import anywhere
@@ -41,11 +42,11 @@ def rate(law: str, v: float, z: float, level: float, ratio: float = RATIO) -> fl
 @given(v=st.floats(-10, 10), z=st.floats(-4e-4, 4e-4), level=st.floats(0.01, 40))
 def test_rate_of_lugre_is_the_textbooks_below_the_limit_and_limited_above(v: float, z: float, level: float) -> None:
     found = friction.bristle_rate(v, z, level, S0)
-    if S0 * abs(v) <= 8000 * level:
+    if S0 * abs(v) <= STEP.relaxation_limit * level:
         assert found == pytest.approx(rate("lugre", v, z, level), rel=1e-12, abs=1e-12)
     else:
         toward = math.copysign(level / S0, v) - z
-        assert found == pytest.approx(8000 * toward, rel=1e-6, abs=1e-9)
+        assert found == pytest.approx(STEP.relaxation_limit * toward, rel=1e-6, abs=1e-9)
 
 
 @given(v=st.floats(-10, 10), z=st.floats(-6e-4, 6e-4), level=st.floats(0.5, 40), ratio=st.floats(0.01, 0.9))
@@ -53,7 +54,7 @@ def test_elasto_plastic_rate_is_the_papers_below_the_limit_and_held_above(
     v: float, z: float, level: float, ratio: float
 ) -> None:
     found = friction.bristle_rate_by_law(v, z, 1 / level, S0, False, ratio, 1 / (1 - ratio))
-    held = min(1.0, 5000 * level / (S0 * abs(v))) if v != 0 else 1.0
+    held = min(1.0, STEP.elasto_plastic_limit * level / (S0 * abs(v))) if v != 0 else 1.0
     assert found == pytest.approx(rate("elasto_plastic", v, z, level, ratio) * held, rel=1e-9, abs=1e-9)
 
 

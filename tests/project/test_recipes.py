@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -74,9 +75,13 @@ def tree(tmp_path_factory):
     return place
 
 
-def performed(recipe, tree, tmp_path):
-    """A copy of the tree after the recipe."""
-    place = tmp_path / "tree"
+@pytest.fixture(scope="module")
+def performed(tree, tmp_path_factory):
+    """The tree after a recipe, by its name: a copy, in which what is compiled for one test is there for the next."""
+    return cache(lambda recipe: _performed(recipe, tree, tmp_path_factory.mktemp(recipe) / "tree"))
+
+
+def _performed(recipe, tree, place):
     shutil.copytree(tree, place, copy_function=os.link)
     for name in files_of(recipe):
         (place / name).unlink(missing_ok=True)  # a link to the file of the plain tree
@@ -120,8 +125,8 @@ def test_a_recipe_touches_and_reads_what_is_told(recipe):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("recipe", ADDED)
-def test_a_recipe_is_all_that_it_takes(recipe, tree, tmp_path):
-    added, place = ADDED[recipe], performed(recipe, tree, tmp_path)
+def test_a_recipe_is_all_that_it_takes(recipe, performed):
+    added, place = ADDED[recipe], performed(recipe)
     own = [name for name in files_of(recipe) if Path(name).name.startswith("test_")]
     for tests, chosen, least in ((own, (), 1), (added.tests, added.chosen, added.least)):
         if tests:
@@ -137,17 +142,18 @@ def test_a_recipe_is_all_that_it_takes(recipe, tree, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_controller_that_is_registered_makes_no_result_stale(tree, tmp_path):
+def test_a_controller_that_is_registered_makes_no_result_stale(tree, performed):
     line = ("-m", "birthsim", "study", "status")
-    (status, said), (plain, before) = (run_in(place, *line) for place in (performed("controller", tree, tmp_path), tree))
+    (status, said), (plain, before) = (run_in(place, *line) for place in (performed("controller"), tree))
     assert (status, plain) == (0, 0), said + before
     assert "; lacks adrc" in said  # of what measures every controller
     assert said.replace("; lacks adrc", "") == before
 
 
 @pytest.mark.slow
-def test_a_parameter_that_an_oracle_does_not_know_fails_a_test_that_names_both(tree, tmp_path):
-    place = performed("parameter", tree, tmp_path)
+def test_a_parameter_that_an_oracle_does_not_know_fails_a_test_that_names_both(tree, performed, tmp_path):
+    place = tmp_path / "tree"
+    shutil.copytree(performed("parameter"), place, copy_function=os.link)
     shutil.copy(tree / "lab" / "studies" / "accuracy" / "second_model.py", place / "second_model.py")
     os.replace(place / "second_model.py", place / "lab" / "studies" / "accuracy" / "second_model.py")
     status, said = run_in(place, "-m", "pytest", "-p", "no:cacheprovider", "tests/oracles/test_completeness.py")

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from fnmatch import fnmatch
 
 import pytest
 
@@ -26,6 +27,14 @@ def test_importing_a_package_loads_no_torch():
     script = "import sys, agents, baselines, birthsim_env; print('torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_no_folder_of_tests_is_left_out(pytestconfig):
+    """Of itself pytest goes into none that is named build."""
+    left_out, folders = pytestconfig.getini("norecursedirs"), {path.parent for path in (ROOT / "tests").rglob("test_*.py")}
+    parts = {part for folder in folders for part in folder.relative_to(ROOT).parts}
+    assert {"build", "physics"} <= parts
+    assert [part for part in parts if any(fnmatch(part, pattern) for pattern in left_out)] == []
 
 
 def test_no_module_gives_a_name_twice():

@@ -179,7 +179,7 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
 @pytest.mark.slow
 def test_the_default_training_improves_on_the_law_on_the_circle(tmp_path):
     """A part of the default budget."""
-    reached = train(TrainingSettings(steps=500_000, validations=4), ResidualSettings(), tmp_path)
+    reached = train(TrainingSettings(steps=200_000, validations=2), ResidualSettings(), tmp_path)
     assert reached["policy"]["lost"] == 0
     assert reached["policy"]["pooled_mm"] < 0.8 * reached["law"]["pooled_mm"]
     assert reached["policy"]["tail_mm"] < 0.8 * reached["law"]["tail_mm"]

@@ -1,153 +1,109 @@
-"""How kernels are compiled: two Numba decorators, machine code kept on disk, and a word while a user waits.
+"""Kernels: loops over lanes, run by prebuilt machine code where their sources are those that it was built from, else by Numba.
 
 Kernels run over lanes (environments). They are written so that LLVM vectorises the innermost loop: quantities are rows of
 scratch arrays whose shape is a compile-time constant, helpers are always inlined, conditions are max, min or a ternary, and
 only + - * / sqrt occur inside. Without ``fastmath`` every operation is IEEE-exact, so a lane computes the same bits
-whether it runs in a vector register or alone.
-
-Numba's own cache looks at the file of the outermost function only. Ours names a file by everything that the machine code
-depends on: the code of all files that the kernel's module imports, directly or not, the signature, the processor and the
-versions.
-A file that is missing, damaged or cannot be written costs a compilation, never the command.
+whether it runs in a vector register or alone. Numba is imported when a kernel is first compiled, and not before.
 """
 
-import hashlib
-import os
+import functools
 import pickle
 import sys
 from collections.abc import Callable
-from pathlib import Path
+from importlib import import_module
 from typing import Any, TypeVar
 
-import llvmlite
-import llvmlite.binding
-import numba
-from numba.core import event, serialize
-from numba.core.caching import NullCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, CompileResult
-from numba.core.registry import CPUDispatcher
-
-import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
-from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
+from birthsim_env.physics.compiled import prebuilt
 from birthsim_env.physics.compiled.plain import DEBUG, plain
-from birthsim_env.physics.compiled.sources import PACKAGES, source_stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
-"""Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise.
 
-``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
+class Kernel:
+    """A kernel, or a helper, which is a kernel when it is called from Python."""
+
+    def __init__(self, function: Callable[..., Any], inlined: bool = False) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func, self.inlined = function, inlined
+        self._ready: dict[Any, Callable[..., Any]] = {}
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        if named:
+            return self.numba(*arguments, **named)
+        kinds = tuple(map(prebuilt.kind_of, arguments))
+        ready = self._ready.get(kinds)
+        if ready is None:
+            ready = self._ready[kinds] = prebuilt.function(self, kinds) or self.numba
+        return ready(*arguments)
+
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        """By name; by value what another process would not find by that: a script's own, and what stands in a function."""
+        name, module = self.py_func.__qualname__, self.py_func.__module__
+        if module != "__main__" and getattr(sys.modules.get(module), name, None) is self:
+            return name
+        from birthsim_env.physics.compiled import with_numba  # late: prebuilt code needs none of it
+
+        return _loaded, (with_numba.dumped(self.py_func), self.inlined)
+
+    @functools.cached_property
+    def numba(self) -> Any:
+        """What Numba makes of it."""
+        from birthsim_env.physics.compiled import with_numba  # late: as above
+
+        return with_numba.kernel(self.py_func)
+
+    @functools.cached_property
+    def by_numbers(self) -> Callable[..., int]:
+        """What runs it for whole numbers."""
+        found: Callable[..., int] = prebuilt.of_numbers(self, self.py_func.__code__.co_argcount) or self.numba
+        return found
+
+    @functools.cached_property
+    def _within(self) -> Any:
+        from birthsim_env.physics.compiled import with_numba  # late: as above
+
+        return with_numba.helper(self.py_func) if self.inlined else self.numba
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What other kernels see of it."""
+        return self._within._numba_type_
 
 
-class _DiskCache(NullCache):
-    """Machine code of one function: a file per signature and processor."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._folder = folder
-        path = Path(function.__code__.co_filename).resolve()
-        # The module of a user's file has its whole path for a name.
-        self._name = f"{Path(function.__module__).name}.{function.__qualname__}"
-        # A module that runs generated source holds it under this name.
-        text = source_stamp(path) + function.__globals__.get("GENERATED", "")
-        self._stamp = hashlib.sha256(text.encode()).hexdigest()[:16]
-
-    def _path(self, signature: Any, codegen: Any) -> Path:
-        versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
-        how = (BLOCK, *(os.environ.get(f"NUMBA_{kind}_VECTORIZE") for kind in ("LOOP", "SLP")))
-        kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions, how)).encode()).hexdigest()
-        return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        target_context.refresh()
-        content = kept(self._path(sig, target_context.codegen()))
-        return content and CompileResult._rebuild(target_context, *pickle.loads(content))  # type: ignore[no-untyped-call]
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        keep(self._path(sig, data.codegen), serialize.dumps(data._reduce()))  # type: ignore[no-untyped-call]
-
-
-class _Announcer(event.Listener):
-    """Says once per process that kernels are being compiled, since the first step of a new installation waits for it."""
-
-    def __init__(self) -> None:
-        self._said = False
-
-    def on_start(self, event: Any) -> None:
-        module = getattr(event.data["dispatcher"].py_func, "__module__", "") or ""
-        if not self._said and module.split(".")[0] in PACKAGES:
-            self._said = True
-            then = "the result is cached" if cache_folder() else "no folder is writable, so every process compiles anew"
-            print(f"BirthSIM: compiling numerical kernels, usually 10 to 40 s; {then}.", file=sys.stderr, flush=True)
-
-    def on_end(self, event: Any) -> None:
-        pass
-
-
-# LLVM finds that nothing else points into a block of scratch only if it may look at all uses of the block: one for every row.
-llvmlite.binding.set_option("birthsim", "-capture-tracking-max-uses-to-explore=2000")
-
-event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
+def _loaded(content: bytes, inlined: bool) -> Kernel:
+    return Kernel(pickle.loads(content), inlined)
 
 
 def kernel(function: F) -> F:
-    """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock.
+    """Compile a loop over lanes; releases the interpreter lock.
 
     With ``BIRTHSIM_DEBUG=1`` it stays plain Python, as a ``helper`` does."""
-    if DEBUG:
-        return plain(function)
-    compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    folder = cache_folder()
-    # What a closure or an interactive session holds, no hash of sources knows.
-    written = Path(function.__code__.co_filename).is_file()
-    if folder is not None and function.__closure__ is None and written:
-        compiled._cache = _DiskCache(function, folder)
-    return compiled  # type: ignore[no-any-return]
-
-
-class _Inlined(JITCodeLibrary):
-    """Code of a helper. Machine code is made of the kernels that it is inlined into, so it is not optimised by itself."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """None: Python calls the kernel that a helper is when it stands alone."""
-        return 0
-
-    @property
-    def codegen(self) -> Any:
-        """What keeps the constants of Python's exceptions beside machine code; here there is none."""
-        return self
-
-    def set_env(self, name: str, environment: Any) -> None:
-        pass
-
-
-class _Inlining(Compiler):
-    def __init__(self, typing: Any, target: Any, _: Any, *others: Any) -> None:
-        super().__init__(typing, target, _Inlined(target.codegen(), "helper"), *others)  # type: ignore[no-untyped-call]
-
-
-class _Helper(CPUDispatcher):
-    """What kernels see of a helper; from Python it is a kernel of its own."""
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        options = {name: True for name in ("nopython", "forceinline", "no_cpython_wrapper", "no_cfunc_wrapper")}
-        super().__init__(function, targetoptions={**options, "error_model": "numpy"}, pipeline_class=_Inlining)
-        self._alone = kernel(function)
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self._alone(*arguments)
+    return plain(function) if DEBUG else Kernel(function)  # type: ignore[return-value]
 
 
 def helper(function: F) -> F:
     """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
-    return plain(function) if DEBUG else _Helper(function)  # type: ignore[return-value]
+    return plain(function) if DEBUG else Kernel(function, inlined=True)  # type: ignore[return-value]
+
+
+def of_numbers(kernel: Callable[..., int]) -> Callable[..., int]:
+    """What runs a kernel of whole numbers that returns one, without a look at its arguments: for whoever calls it often.
+
+    An array is passed by its address, with what else is fixed in an array of whole numbers that is kept along."""
+    return kernel.by_numbers if isinstance(kernel, Kernel) else kernel
+
+
+class Late:
+    """What kernels call of ``module``, which needs Numba: it is imported when Numba first asks."""
+
+    def __init__(self, module: str, name: str) -> None:
+        self._module, self._name = module, name
+
+    @property
+    def _numba_type_(self) -> Any:
+        from birthsim_env.physics.compiled import with_numba  # late: as above
+
+        return with_numba.type_of(getattr(import_module(self._module), self._name))
 
 
 def over(function: Callable[..., Any], *arguments: Any) -> None:

@@ -11,20 +11,17 @@ import ast
 import dis
 import inspect
 import math
-import os
 import textwrap
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 
+from birthsim_env.physics.compiled.switches import switched
+
 F = TypeVar("F", bound=Callable[..., Any])
 
-_ASKED = os.environ.get("BIRTHSIM_DEBUG", "")
-if _ASKED not in ("", "0", "1"):
-    raise ValueError(f"BIRTHSIM_DEBUG = {_ASKED!r}; allowed: 1 for plain Python, 0 for machine code")
-
-DEBUG = _ASKED == "1"
+DEBUG = switched("BIRTHSIM_DEBUG", False, "plain Python", "machine code")
 """Whether kernels stay plain Python."""
 
 NO_NUMBER = -(2**63)

@@ -17,19 +17,10 @@ from numba.core.imputils import impl_ret_borrowed, lower_builtin, lower_constant
 from numba.core.typing.templates import AttributeTemplate, infer_getattr, make_callable_template
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
-from birthsim_env.physics.compiled.compilation import BLOCK
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.named import Layouts
 
 WORD, NUMBERS = ir.IntType(64), ir.DoubleType().as_pointer()
-
-
-class Layouts(type):
-    """Type of the layouts, by which Numba knows them."""
-
-
-class Named(metaclass=Layouts):
-    """An array, ``rows``, whose layout is its class."""
-
-    __slots__ = ("rows",)
 
 
 class Layout(types.Callable, types.Opaque):
@@ -107,8 +98,8 @@ def _type_of_layout(layout: Layouts, _: Any) -> Layout:
     return Layout(layout)
 
 
-@typeof_impl.register(Named)
-def _type_of_record(record: Any, _: Any) -> Record:
+def type_of_record(record: Any) -> Record:
+    """The type of an array's rows by name."""
     return Record(type(record), typeof(record.rows))
 
 

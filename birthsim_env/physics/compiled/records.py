@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.record_types import Named
+from birthsim_env.physics.compiled.named import Named
 
 Array = NDArray[np.float64]
 V = TypeVar("V")

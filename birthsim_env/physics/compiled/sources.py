@@ -6,17 +6,24 @@ takes longer than all the rest of an import, so what was found is kept beside th
 """
 
 import ast
+import contextlib
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
+from birthsim_env.physics.compiled.kept import PACKAGE, cache_folder, keep, kept
+from birthsim_env.physics.step import DEFAULT, METHOD
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "lab")
+
+
+ASIDE = frozenset(Path(__file__).resolve().with_name(f"{name}.py") for name in ("kept", "prebuilt", "sources"))
+"""What finds machine code, and has no part in making it."""
 
 
 class Source(NamedTuple):
@@ -33,14 +40,30 @@ class Source(NamedTuple):
 def file_of(module: str) -> Path | None:
     """The source file of one of this project's modules, or None."""
     place = ROOT.joinpath(*module.split("."))
-    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file())
+    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if os.path.isfile(path))
     return next(found, None) if is_ours(module) else None
 
 
 @cache
 def source(path: Path) -> Source:
     """What a source file holds, as this process finds it at first."""
-    return Source(*remembered(path, path.read_bytes(), "code", _read, Path(__file__)))
+    content = path.read_bytes()
+    known = _prebuilt().get(place_of(content))
+    return Source(*(known or remembered(path, content, "code", _read, Path(__file__))))
+
+
+@cache
+def _prebuilt() -> dict[str, Any]:
+    """What the files hold that prebuilt code was made from."""
+    with contextlib.suppress(OSError, ValueError):
+        found: dict[str, Any] = json.loads((PACKAGE / "prebuilt" / "sources.json").read_bytes())
+        return found
+    return {}
+
+
+def place_of(content: bytes, readers: Iterable[Path] = (Path(__file__),)) -> str:
+    """What names the content of a file and the code of those who read it."""
+    return hashlib.sha256(b"".join(own.read_bytes() for own in readers) + content).hexdigest()[:16]
 
 
 def remembered(path: Path, content: bytes, kind: str, read: Callable[[bytes], Any], *readers: Path) -> Any:
@@ -49,8 +72,7 @@ def remembered(path: Path, content: bytes, kind: str, read: Callable[[bytes], An
     if folder is None:
         return read(content)
     place = hashlib.sha256(str(path).encode()).hexdigest()[:8]
-    found = hashlib.sha256(b"".join(own.read_bytes() for own in readers) + content).hexdigest()[:16]
-    file = folder / f"{path.stem}_{place}-{found}.{kind}"
+    file = folder / f"{path.stem}_{place}-{place_of(content, readers)}.{kind}"
     if (held := kept(file)) is not None:
         return json.loads(held)
     made = read(content)
@@ -65,12 +87,12 @@ def imports(path: Path) -> frozenset[Path]:
     return frozenset(file for group in groups if (file := next(filter(None, map(file_of, group)), None)))
 
 
-def dependencies(paths: Iterable[Path]) -> list[Path]:
-    """Source files and all that they import, directly or not, sorted."""
+def dependencies(paths: Iterable[Path], aside: frozenset[Path] = frozenset()) -> list[Path]:
+    """Source files and all that they import, directly or not, sorted; without files that stand ``aside``."""
     waiting = list(paths)
     seen = set(waiting)
     while waiting:
-        found = imports(waiting.pop()) - seen
+        found = imports(waiting.pop()) - seen - aside
         seen |= found
         waiting += found
     return sorted(seen)
@@ -78,13 +100,22 @@ def dependencies(paths: Iterable[Path]) -> list[Path]:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not."""
-    digest = hashlib.sha256()
-    for file in dependencies([path]):
-        # A user's own kernel may lie anywhere.
-        place = str(file.relative_to(ROOT) if file.is_relative_to(ROOT) else file)
+    """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not.
+
+    Another step of integration than the default has another hash."""
+    digest = hashlib.sha256(b"" if METHOD == DEFAULT else METHOD.encode())
+    for file in dependencies([path], ASIDE):
+        # A user's own kernel may lie anywhere, and generated source lies in the folder of what is kept.
+        ours = file.suffix == ".py" and file.is_relative_to(ROOT)
+        place = file.relative_to(ROOT).as_posix() if ours else file.name
         digest.update(f"{place}{source(file).code}".encode())
     return digest.hexdigest()
+
+
+def stamp_of(function: Any) -> str:
+    """What the machine code of a kernel depends on: its sources, and the text of a module that ran generated source."""
+    text = source_stamp(Path(function.__code__.co_filename).resolve()) + function.__globals__.get("GENERATED", "")
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def is_ours(module: str) -> bool:

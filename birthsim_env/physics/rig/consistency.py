@@ -1,16 +1,16 @@
 """What the sections of a rig must fulfil together, and what of them follows where another one changes."""
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any
+
+from birthsim_env.physics.step import STEP
 
 if TYPE_CHECKING:
     from birthsim_env.physics.rig.parameters import Parameters
 
 STOP_DEPTH = 0.01
 """m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
-
-FASTEST_RATE = 7000.0
-"""1/s. Runge-Kutta steps of 0.25 ms are stable up to 11000; the spring of the bristles takes its share."""
 
 
 def check_together(rig: "Parameters") -> None:
@@ -53,11 +53,28 @@ def _check_stability(rig: "Parameters") -> None:
     damping = viscous + (coulomb / f.sign_speed if f.law == "coulomb" else f.bristle_damping)
     m = rig.mechanics
     damping /= 1 - m.mode_mass_fraction if m.mode_frequency else 1
-    if damping / m.mass > FASTEST_RATE:
+    steps = f"so that steps of {1e3 * STEP.seconds:.2g} ms follow"
+    if damping / m.mass > STEP.fastest_rate:
         raise ValueError(
             f"Mechanics.mass = {m.mass!r} is impossible with this friction; allowed: at least "
-            f"{damping / FASTEST_RATE:.3g} kg, or less friction, so that steps of 0.25 ms follow the motion"
+            f"{damping / STEP.fastest_rate:.3g} kg, or less friction, {steps} the motion"
         )
+    volume = settling_volume(rig)
+    if rig.chambers.whole_dead_volume < volume / STEP.fastest_air:
+        raise ValueError(
+            f"Chambers.dead_volume = {rig.chambers.dead_volume!r} is impossible with these valves; allowed: at least "
+            f"{volume / STEP.fastest_air:.3g} m3 with the tube's, or smaller valves, {steps} the pressure"
+        )
+
+
+def settling_volume(rig: "Parameters") -> float:
+    """m3/s. Over a chamber's volume it is the rate at which its pressure follows another close to it through an open valve.
+
+    There the flow is linear in the difference of the pressures: gamma r T dq/dP, of ``valves.laminar_slope``.
+    """
+    air, valves = rig.air, rig.valves
+    slope = valves.sonic_conductance * air.reference_density * math.sqrt(air.coldness) * valves.laminar
+    return float(air.heat_capacity_ratio * air.gas_constant * air.temperature * slope)
 
 
 def least_dead_volume(rig: "Parameters") -> float:

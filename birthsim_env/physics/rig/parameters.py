@@ -18,20 +18,18 @@ from birthsim_env.physics.rig.mechanical import Cylinder, Friction, Geometry, Me
 from birthsim_env.physics.rig.pneumatic import Air, Chambers, Valves
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
+from birthsim_env.physics.step import STEP
 
 __all__ = [
     "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters",
     "Valves", "load_parameters", "parameter_of", "value_of",
 ]  # fmt: skip
 
-SHORTEST_TUBE = 0.05
-"""m. A shorter tube has the lag of one of this length, 0.15 ms, which steps of 0.25 ms follow."""
-
 
 def _tube_rate(rig: Any) -> Any:
     air, length = rig.air, rig.chambers.tube_length
     sound = np.sqrt(air.heat_capacity_ratio * air.gas_constant * air.temperature)
-    return np.where(np.greater(length, 0.0), sound / np.maximum(length, SHORTEST_TUBE), 0.0)
+    return np.where(np.greater(length, 0.0), sound / np.maximum(length, STEP.shortest_tube), 0.0)
 
 
 @dataclass(frozen=True)

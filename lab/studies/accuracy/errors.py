@@ -17,6 +17,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.runge_kutta import STAGES
 from lab.studies.accuracy.motions import PERIOD, PERIODS, Motion, smooth
 from lab.studies.accuracy.second_model import SecondModel
 
@@ -75,9 +76,9 @@ def euler(plant: Plant, command: Array, push: Array, duration: float, step: floa
         x += step * first
 
 
-METHODS: dict[str, Advance] = {"Euler": euler, "Heun": heun, "Runge-Kutta 4": runge_kutta}
-SHIPPED = "Runge-Kutta 4"
-EVALUATIONS = {"Euler": 1, "Heun": 2, SHIPPED: 4}
+SHIPPED = f"Runge-Kutta {STAGES}"
+METHODS: dict[str, Advance] = {"Euler": euler, "Heun": heun, SHIPPED: runge_kutta}
+EVALUATIONS = {"Euler": 1, "Heun": 2, SHIPPED: STAGES}
 """Evaluations of the right-hand side in a step, which are the orders too."""
 
 

@@ -57,7 +57,7 @@ def packed_fraction() -> tuple[int, int]:
     # Machine code from the cache cannot be inspected, so the integrator is compiled once more.
     advance: Any = dynamics.advance
     compiled = numba.njit(error_model="numpy", nogil=True)(advance.py_func)
-    compiled.compile(advance.signatures[0])
+    compiled.compile(advance.numba.signatures[0])
     code = "\n".join(compiled.inspect_asm().values())
     return len(re.findall(r"\bv?(?:div|sqrt)pd\b", code)), len(re.findall(r"\bv?(?:div|sqrt)sd\b", code))
 

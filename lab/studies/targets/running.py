@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from birthsim_build.bundle import identifier
+from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.threads import Threads
 from birthsim_build.code.tools import run_tool
 from birthsim_build.device.export import write_programs
-from birthsim_build.device.machine import WIDTH, Host
+from birthsim_build.device.machine import Host
 from birthsim_build.image import HEAD
 from birthsim_build.layout import LAYOUT, ROWS
 from birthsim_env.loop.rows import ASKED, WORLD

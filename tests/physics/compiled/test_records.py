@@ -10,7 +10,8 @@ from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import ASKED, OPENING, SEEN, WORLD, Seen, Signals, World
 from birthsim_env.loop.signals import Motion, Reference, Setpoints
 from birthsim_env.loop.stage import Stage, scratch
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.blocks import BLOCK
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 

@@ -1,5 +1,6 @@
 """``Plant`` as an interface: shapes, samples of the force, steps, the start, vectorised kernel."""
 
+import math
 import os
 import platform
 import re
@@ -10,8 +11,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.runge_kutta import STAGES
 from tests.console import ROOT
 
 
@@ -55,11 +58,12 @@ def test_force_samples_are_successive_calls() -> None:
 
 
 def test_steps_are_never_longer_than_the_default_and_fill_the_duration() -> None:
-    """0.9 ms is four steps of 0.225 ms: the spool, alone in its equation, shows both the time passed and the step."""
+    """0.9 of four steps is four of 0.9: the spool, alone in its equation, shows both the time passed and the step."""
     plant = Plant()
-    plant.advance(np.ones((4, 1)), np.zeros((2, 1)), 0.9e-3)
-    h = 0.225e-3 / 0.004
-    assert plant.state[14, 0] == pytest.approx(1 - (1 - h + h**2 / 2 - h**3 / 6 + h**4 / 24) ** 4, rel=1e-13)
+    plant.advance(np.ones((4, 1)), np.zeros((2, 1)), 3.6 * dynamics.INTEGRATION_STEP)
+    h = 0.9 * dynamics.INTEGRATION_STEP / 0.004
+    left = sum((-h) ** k / math.factorial(k) for k in range(STAGES + 1))
+    assert plant.state[14, 0] == pytest.approx(1 - left**4, rel=1e-13)
 
 
 DISASSEMBLE = """

@@ -1,0 +1,1 @@
+"""Steps of integration side by side: their error, and what controllers make of it."""
