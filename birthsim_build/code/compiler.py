@@ -13,10 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import numba
 import numpy as np
-from llvmlite.binding import llvm_version_info
 
 from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.threads import Threads
@@ -96,7 +93,7 @@ def _place(request: dict[str, Any], arrays: dict[str, Words]) -> Path | None:
     sources = hashlib.sha256("".join(source_stamp(Path(str(file))) for file in files).encode())
     for name, words in arrays.items():
         sources.update(name.encode() + words.tobytes())
-    versions = (numba.__version__, llvmlite.__version__, llvm_version_info, sys.implementation.cache_tag)
+    versions = (*compiler_versions(), sys.implementation.cache_tag)
     kind = hashlib.sha256(repr((request, versions)).encode()).hexdigest()
     return folder / f"birthsim_build.{request['target']}-{kind[:16]}-{sources.hexdigest()[:16]}.objects"
 
@@ -112,8 +109,17 @@ def has_linker() -> bool:
     return find_spec("ziglang") is not None
 
 
+def compiler_versions() -> tuple[Any, ...]:
+    """Of Numba, llvmlite and LLVM."""
+    import llvmlite.binding  # late: who lists devices need not compile
+    import numba
+
+    return numba.__version__, llvmlite.__version__, llvmlite.binding.llvm_version_info
+
+
 def require_llvm() -> None:
     """Raises ``ValueError`` for an LLVM before ``LEAST_LLVM``."""
+    _, _, llvm_version_info = compiler_versions()
     if llvm_version_info[0] < LEAST_LLVM:
         found = ".".join(map(str, llvm_version_info))
         raise ValueError(f"llvmlite has LLVM {found}; allowed: {LEAST_LLVM} or later, llvmlite 0.50")

@@ -224,6 +224,11 @@ define void @birthsim_{name}(i64 %thread, i64 %block, i64 %width, ptr %program, 
     )
 
 
+def _limited(name: str) -> str:
+    """To blocks of ``WIDTH`` where they share memory. Others are not: where ptxas is told, it spills more of an adjoint."""
+    return f' "nvvm.maxntid"="{WIDTH}"' if name == ADVANCE else ""
+
+
 def _kernels(names: Iterable[str]) -> str:
     places = {"thread": "tid", "block": "ctaid", "width": "ntid"}
     declared = "".join(f"\ndeclare i32 @llvm.nvvm.read.ptx.sreg.{place}.x()" for place in places.values())
@@ -233,7 +238,7 @@ def _kernels(names: Iterable[str]) -> str:
     )
     return declared + "".join(
         f"""
-define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind "nvvm.maxntid"="{WIDTH}" {{
+define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind{_limited(name)} {{
 {known}  call void @{name}(i64 %thread64, i64 %block64, i64 %width64, ptr %program, i64 %one, i64 %two)
   ret void
 }}"""

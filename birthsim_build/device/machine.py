@@ -11,7 +11,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
-import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
@@ -77,6 +76,8 @@ class Host:
 @cache
 def _engine(functions: tuple[str, ...], threads: Threads) -> Any:
     """The code in this process, for good: whoever has an address in it may use it."""
+    import llvmlite.binding as llvm  # late: who lists devices need not compile
+
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     machine = llvm.Target.from_default_triple().create_target_machine(jit=True)

@@ -8,10 +8,10 @@
  *     birthsim_begin   <<<blocks, @WIDTH@>>>(program, starts, count);  episodes begin in count lanes
  *     birthsim_advance <<<blocks, @WIDTH@>>>(program, periods, 0);     control periods, the last of which closes a policy step
  *
- * with @WIDTH@ * blocks >= count, or lanes; larger blocks fail to launch, since threads of a block share memory. `starts` is the address of six rows of `count` 64-bit words: lanes; the seed of each; the
- * number of its episode, each of which is drawn anew; and three doubles: 0, 0, 0 to begin on the target, or 1 and the place
- * (x, y), m, where to begin. An episode is that of Python with the same seed, bit for bit; its rig is the exported one, not
- * randomised.
+ * with @WIDTH@ * blocks >= count, or lanes; birthsim_advance fails to launch in larger blocks, since threads of a block share
+ * memory. `starts` is the address of six rows of `count` 64-bit words: lanes; the seed of each; the number of its episode, each
+ * of which is drawn anew; and three doubles: 0, 0, 0 to begin on the target, or 1 and the place (x, y), m, where to begin. An
+ * episode is that of Python with the same seed, bit for bit; its rig is the exported one, not randomised.
  *
  * Reward, ends and info in the data are those of the last policy step; the fastest collisions, impact1 and impact2, are those
  * since they were last set to zero. Word @MISSED@ of the program counts how often a law could not serve what it was asked for.

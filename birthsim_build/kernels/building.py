@@ -13,11 +13,9 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import llvmlite
-import numba
-from llvmlite.binding import llvm_version_info
 from tqdm import tqdm
 
+from birthsim_build.code.compiler import compiler_versions
 from birthsim_build.kernels import compiling
 from birthsim_build.kernels.joining import join
 from birthsim_build.kernels.paths import PATHS
@@ -66,8 +64,7 @@ def made(kernels: Sequence[Wanted], libraries: Sequence[str], work: Path) -> lis
 
 def _place(wanted: Wanted, stamp: str, folder: Path) -> Path:
     """Where the objects of a kernel are kept."""
-    versions = numba.__version__, llvmlite.__version__, llvm_version_info
-    built = stamp, *versions, source_stamp(Path(compiling.__file__).resolve())
+    built = stamp, *compiler_versions(), source_stamp(Path(compiling.__file__).resolve())
     return folder / f"{symbol_of(wanted.key)}-{hashlib.sha256(repr(built).encode()).hexdigest()[:16]}.objects"
 
 

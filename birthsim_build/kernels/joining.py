@@ -23,5 +23,6 @@ def join(name: str, objects: Mapping[str, bytes], out: Path) -> None:
         if name in _ZIG:
             link("cc", "-target", _ZIG[name], "-shared", "-s", "-o", str(out), *places)
         else:
-            link("ld.lld", "-m", EMULATIONS[name.removesuffix(".so").removesuffix("-v3")], *_ELF, "-o", str(out), *places)
+            machine = next(emulation for processor, emulation in EMULATIONS.items() if name.startswith(processor))
+            link("ld.lld", "-m", machine, *_ELF, "-o", str(out), *places)
     out.chmod(0o644)

@@ -81,7 +81,6 @@ class Processor:
         dispatched = {name for name, used in _multiarray_umath.__cpu_features__.items() if used}
         dispatched &= set(_multiarray_umath.__cpu_dispatch__)
         return {
-            "BIRTHSIM_PREBUILT": "0",
             "NUMBA_CPU_NAME": self.llvm,
             "NUMBA_CPU_FEATURES": ",".join(f"+{feature}" for feature in self.features),
             "NUMBA_CACHE_DIR": str(ROOT / "out" / "processors" / name),

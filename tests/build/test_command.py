@@ -21,7 +21,7 @@ LACKS = [
 
 @pytest.mark.parametrize(("target", "llvm", "gone", "said"), LACKS)
 def test_without_what_it_needs_it_says_what_to_install(target, llvm, gone, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", llvm)
+    monkeypatch.setattr("llvmlite.binding.llvm_version_info", llvm)
     monkeypatch.setattr(f"birthsim_build.code.{gone}", lambda *_: None)
     monkeypatch.setattr("birthsim.exports.loops.make_bundle", None)  # before anything is compiled
     status, _, complained = call("export", monkeypatch, capsys, "--to", target, "--out", tmp_path / "out")

@@ -138,6 +138,7 @@ def test_steps_of_integration_access_no_memory_but_what_a_block_shares(code):
         assert 40 < accessed["ld.shared"] * ROOTS / roots <= PARAMETERS
     assert re.findall(r"\.shared .*\[(\d+)\]", text) == [str(SHARED)]
     assert SHARED < 48 * 1024
+    assert re.findall(r"entry birthsim_(\w+)\([^)]*\)\s*\.maxntid (\d+)", text) == [("advance", str(WIDTH))]
     column = r"(?:ld|st)\.shared\.b64 .*\[%rd\d+(?:\+(\d+))?\]"
     assert {int(row or 0) for row in re.findall(column, text)} == set(range(0, SHARED, 8 * WIDTH))
 

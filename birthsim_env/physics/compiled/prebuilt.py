@@ -3,7 +3,7 @@
 It serves while a kernel's sources are those that it was built from. Else, and for other arguments, Numba compiles, a kernel
 at a time. ``BIRTHSIM_PREBUILT=0`` switches it off. The folder ``birthsim_env/prebuilt`` has
 
-    <target>.so, .dylib, .dll    x86-64-v3, aarch64
+    <target>.so, .dylib, .dll    x86-64-v3, x86-64-v4, aarch64
     index.json                   {"format": FORMAT, "libraries": {file: SHA-256}, "kernels": {key: [stamp, result]}}
     sources.json                 {``sources.place_of`` a file: ``sources.Source``}, of all files that kernels are made of
 
@@ -52,7 +52,10 @@ LANES = 32
 
 FOLDER = PACKAGE / "prebuilt"
 ENDINGS = {"linux": "so", "darwin": "dylib", "win32": "dll"}
-_MACHINES = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3", "aarch64": "aarch64", "arm64": "aarch64"}
+_MACHINES = {"x86_64": "x86-64", "AMD64": "x86-64", "aarch64": "aarch64", "arm64": "aarch64"}
+_LEVELS = {"v4": ("AVX512_SKX",), "v3": ("AVX2", "FMA3", "F16C")}
+"""Of x86-64, the highest first -> what NumPy calls that a processor has. With AVX-512 there are twice as many registers."""
+
 
 _NUMBERS = {int: "i", np.int64: "i", float: "d", np.float64: "d", bool: "b", np.bool_: "b", np.uint64: "u"}
 _PASSED = {"i": ctypes.c_int64, "d": ctypes.c_double, "b": ctypes.c_bool, "u": ctypes.c_uint64}
@@ -66,8 +69,9 @@ _C, _F, _ALIGNED, _WRITEABLE = 0x1, 0x2, 0x100, 0x400
 def target() -> str:
     """The library's file for this machine, whether or not it is there; empty where none can be."""
     machine = _MACHINES.get(platform.machine(), "")
-    if machine == "x86-64-v3" and not all(_features().get(one) for one in ("AVX2", "FMA3", "F16C")):
-        machine = ""
+    if machine == "x86-64":
+        levels = (level for level, needed in _LEVELS.items() if all(_features().get(one) for one in needed))
+        machine = next((f"{machine}-{level}" for level in levels), "")
     return f"{machine}.{ENDINGS[sys.platform]}" if machine and sys.platform in ENDINGS else ""
 
 

@@ -12,7 +12,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from birthsim_env.physics.compiled.kept import PACKAGE, cache_folder, keep, kept
@@ -104,12 +104,15 @@ def source_stamp(path: Path) -> str:
 
     Another step of integration than the default has another hash."""
     digest = hashlib.sha256(b"" if METHOD == DEFAULT else METHOD.encode())
-    for file in dependencies([path], ASIDE):
-        # A user's own kernel may lie anywhere, and generated source lies in the folder of what is kept.
-        ours = file.suffix == ".py" and file.is_relative_to(ROOT)
-        place = file.relative_to(ROOT).as_posix() if ours else file.name
+    for place, file in sorted((_place(file), file) for file in dependencies([path], ASIDE)):
         digest.update(f"{place}{source(file).code}".encode())
     return digest.hexdigest()
+
+
+def _place(file: Path) -> PurePosixPath:
+    """Where a file stands on any machine: a user's own may lie anywhere, generated source where machine code is kept."""
+    ours = file.suffix == ".py" and file.is_relative_to(ROOT)
+    return PurePosixPath(file.relative_to(ROOT) if ours else file.name)
 
 
 def stamp_of(function: Any) -> str:

@@ -90,6 +90,22 @@ def test_the_stamp_is_of_all_that_a_kernel_imports():
     assert len(stamps) == 2
 
 
+def test_the_stamp_knows_no_folder(tmp_path):
+    """In the order of whole paths, what these import stands before the first and behind the second."""
+    generated, own = f"{tmp_path.name}.source", "own.py"
+    places = {generated: [ROOT / "out", ROOT / "birthsim_env" / "__pycache__"], own: [tmp_path / "a", tmp_path / "b"]}
+    for name, folders in places.items():
+        stamps = set()
+        for folder in folders:
+            folder.mkdir(exist_ok=True)
+            (folder / name).write_text(PROBE)
+            try:
+                stamps.add(source_stamp(folder / name))
+            finally:
+                (folder / name).unlink()
+        assert len(stamps) == 1, name
+
+
 ODD = """
 'import birthsim_env.observation'
 import birthsim_env.reward, numpy as np; from birthsim_env import info

@@ -247,11 +247,15 @@ def test_nothing_is_opened_for_other_blocks_or_processors_or_where_it_is_missing
 
 
 def test_an_older_processor_has_no_library(monkeypatch):
-    assert prebuilt.target().partition(".")[0] in ("x86-64-v3", "aarch64")
+    assert prebuilt.target().partition(".")[0] in ("x86-64-v3", "x86-64-v4", "aarch64")
     monkeypatch.setattr(prebuilt.platform, "machine", lambda: "x86_64")
-    features = prebuilt._features()
-    for name in ("AVX2", "FMA3", "F16C"):
-        monkeypatch.setattr(prebuilt, "_features", lambda name=name: {**features, name: False})
+    known = dict.fromkeys(("AVX2", "FMA3", "F16C"), True)
+    monkeypatch.setattr(prebuilt, "_features", lambda: {**known, "AVX512_SKX": True})
+    assert prebuilt.target().startswith("x86-64-v4.")
+    monkeypatch.setattr(prebuilt, "_features", lambda: known)
+    assert prebuilt.target().startswith("x86-64-v3.")
+    for name in known:
+        monkeypatch.setattr(prebuilt, "_features", lambda name=name: {**known, name: False})
         assert prebuilt.target() == ""
     monkeypatch.setattr(prebuilt.platform, "machine", lambda: "riscv64")
     assert prebuilt.target() == ""
