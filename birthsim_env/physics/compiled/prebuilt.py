@@ -182,16 +182,9 @@ def function(kernel: "Kernel", kinds: tuple[Any, ...]) -> Callable[..., Any] | N
     names = [f"a{k}" for k in range(len(codes))]
     ways = {True: "{}", False: f"id({{}}) + {_HEAD}"}
     given = [ways[code in _PASSED].format(name + ".rows" * (":" in code)) for name, code in zip(names, codes, strict=True)]
-    call: Any = eval(f"lambda {', '.join(['value', *names])}: native({', '.join(['value', *given])})", {"native": native})
-
-    def nothing(*arguments: Any) -> Any:
-        # Numba raises what prebuilt code cannot.
-        return kernel.numba(*arguments) if call(None, *arguments) else None
-
-    returned: Any = _PASSED.get(result)
-
-    def number(*arguments: Any) -> Any:
-        value = returned()
-        return kernel.numba(*arguments) if call(ctypes.byref(value), *arguments) else value.value
-
-    return nothing if result == "n" else number
+    place, returned = ("None", "None") if result == "n" else ("byref(value := new())", "value.value")
+    # Numba raises what prebuilt code cannot.
+    call = f"numba({', '.join(names)}) if native({', '.join([place, *given])}) else {returned}"
+    known = {"native": native, "numba": lambda *again: kernel.numba(*again), "byref": ctypes.byref, "new": _PASSED.get(result)}
+    run: Callable[..., Any] = eval(f"lambda {', '.join(names)}: {call}", known)
+    return run
