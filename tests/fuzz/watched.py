@@ -12,6 +12,7 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
+from birthsim_env.physics.compiled import prebuilt
 from birthsim_env.physics.compiled.kept import cache_folder
 from tests.console import ROOT
 
@@ -38,6 +39,9 @@ CODE = (str(ROOT), sys.prefix, sys.base_prefix, "<frozen", "<string>", "<__array
 
 cases = settings(max_examples=settings.default.max_examples // 10, suppress_health_check=list(HealthCheck))
 """Examples of one kind: 10 in the profile ``quick``, 400 in ``slow``, 5,000 in ``deep``."""
+
+
+prebuilt._opened()  # once a process, whichever example would be the first
 
 
 class TooSlow(BaseException):

@@ -84,16 +84,20 @@ THREADS = tuple(
 class Process:
     """A process of ``stopwatch.py`` under a checkout, to be left with ``with``; ``cache`` is the folder for machine code.
 
+    Where it is not ``prebuilt``, Numba compiles what the package has machine code for.
+
     Raises ``ValueError`` where the checkout has no ``birthsim_env``.
     """
 
-    def __init__(self, tree: Path, cache: Path | None = None) -> None:
+    def __init__(self, tree: Path, cache: Path | None = None, prebuilt: bool = True) -> None:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, (str(tree.resolve()), os.environ.get("PYTHONPATH"))))
         # Two checkouts with one folder for machine code would throw out each other's.
         environment.pop("NUMBA_CACHE_DIR", None)
         if cache is not None:
             environment["NUMBA_CACHE_DIR"] = str(cache)
+        if not prebuilt:
+            environment["BIRTHSIM_PREBUILT"] = "0"
         # -P keeps the modules beside the script out of the way.
         line = [sys.executable, "-P", stopwatch.__file__]
         self._tree = tree
@@ -159,15 +163,16 @@ def measured(jobs: tuple[Job, ...], trees: tuple[Path, ...], budget: float) -> d
 
 
 def first_steps() -> Iterator[tuple[str, float]]:
-    """CPU s from the start of a new process to the end of its first step: valve mode and every law, compiled and cached.
+    """CPU s from the start of new processes to the end of a first step: valve mode and all laws, prebuilt, compiled and cached.
 
-    All processes share a folder for machine code, which is empty at the beginning: each compiles what those before it have not.
+    All processes share a folder for machine code, which is empty at the beginning: each compiles what those before it have not,
+    where it does without prebuilt code.
     """
     kinds: dict[str, dict[str, Any]] = {"valve mode": {"environment": CIRCLE}}
     for law in LAWS:
         kinds[f"{law} inside, lab sensors"] = {"environment": RESIDUAL, "law": law, "sensors": "lab"}
     with tempfile.TemporaryDirectory() as folder:
-        for state in ("compiled", "cached"):
+        for state in ("prebuilt", "compiled", "cached"):
             for name, arguments in kinds.items():
-                with Process(HERE, Path(folder)) as process:
+                with Process(HERE, Path(folder), state == "prebuilt") as process:
                     yield f"{name}, {state}", process.measure("first_step", **arguments)

@@ -223,7 +223,7 @@ def environments(seconds: float, beside: str) -> Result:
 
 
 def first() -> Result:
-    """Rows of first steps, compiled and cached."""
+    """Rows of first steps, prebuilt, compiled and cached."""
     return {"rows": [(name, seconds, "s") for name, seconds in speed.first_steps()]}
 
 
@@ -263,7 +263,7 @@ STUDY = Study(
     words={
         "seconds": "time per measurement",
         "beside": "a checkout of another commit to measure in turns with this one",
-        "compile": "measure instead how long first steps take, compiled and cached",
+        "compile": "measure instead how long first steps take, prebuilt, compiled and cached",
     },
 )
 register(study="speed", about="speeds, beside what they are to be compared with")(STUDY)
