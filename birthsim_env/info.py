@@ -6,7 +6,7 @@ import numpy as np
 
 from birthsim_env.loop.rows import Signals, World
 from birthsim_env.loop.signals import compliant_offset
-from birthsim_env.physics import control_model, dynamics
+from birthsim_env.physics import air, control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
@@ -80,7 +80,7 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
         )
         info.supply_flow[i] = 0.0
         for k in range(4):
-            inflow, _ = dynamics.flows_of(state, p, i, at.PRESSURES[k], at.TEMPERATURES[k], at.SPOOLS[k])
+            inflow, _ = air.flows_of(state, p, i, at.PRESSURES[k], at.TEMPERATURES[k], at.SPOOLS[k])
             info.supply_flow[i] += max(inflow, 0.0)
     _describe_costs(world, info, n)
 

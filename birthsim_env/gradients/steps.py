@@ -41,7 +41,7 @@ def lay_out(
             dynamics.copy(points[k], x, n)
             dynamics.copy(x, total, n)
             dynamics.copy(x, trial, n)
-        dynamics.stage(x, u, f, p, total, trial, n, weight_of(stage, step), ahead_of(stage, step))
+        dynamics.stage(x, u, f, p, total, trial, n, 1, weight_of(stage, step), ahead_of(stage, step))
         dynamics.copy(total if stage == STAGES - 1 else trial, points[k + 1], n)
 
 

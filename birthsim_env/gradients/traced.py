@@ -128,7 +128,6 @@ def _singles(tables: _Tables, k: int) -> Any:
     return tables.get(k, True)
 
 
-tracing.INSTEAD[stages.scratch] = symbols.empty
 tracing.INSTEAD[stages.block] = tracing.INSTEAD[stages.numbers] = _block
 tracing.INSTEAD[stages.singles] = _singles
 for _kind in (stages.table1, stages.table2, stages.table3, stages.table4):

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.gradients.graph import Scalar, Value
-from birthsim_env.gradients.symbols import Picked, Symbols, bounds, under
+from birthsim_env.gradients.symbols import Picked, Symbols, bounds, empty, under
 from birthsim_env.gradients.syntax import Continues, Rewriter
-from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import exact, stack
 from birthsim_env.physics.compiled.plain import REAL
 
 
@@ -118,7 +118,7 @@ _COMPOSED: dict[Any, Callable[[Value], Value]] = {
     math.isnan: lambda value: value != value,
 }
 
-INSTEAD: dict[Any, Callable[..., Any]] = {}
+INSTEAD: dict[Any, Callable[..., Any]] = {stack.scratch: empty, stack.column: lambda rows: empty(rows)[:, 0]}
 """What stands for functions that make or read arrays in ways of their own; rooms above add theirs."""
 
 

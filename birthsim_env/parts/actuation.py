@@ -15,11 +15,11 @@ from birthsim_env.loop.rows import ACTION, OPENING, STATE, Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.physics import valves
+from birthsim_env.physics.air import driving_flows
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, number
-from birthsim_env.physics.dynamics import driving_flows
 from birthsim_env.physics.plant import Plant
 
 VALVE_LAYOUTS = ("two_valves", "one_valve")

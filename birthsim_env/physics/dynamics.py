@@ -7,7 +7,7 @@ they go from the right-hand side to the Runge-Kutta stage in registers.
 
 import math
 
-from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
+from birthsim_env.physics import air, friction, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK, WARP
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -19,92 +19,6 @@ from birthsim_env.physics.step import STEP
 
 INTEGRATION_STEP = STEP.seconds
 """s. The longest step of the Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
-
-
-@helper
-def driving_flows(p: Array, i: int, pressure: float, inverse: float, inside: float) -> tuple[float, float]:
-    """Flows per unit of conductance from the supply into a chamber, and from it to the atmosphere, Pa kg/m3.
-
-    ``inverse`` is 1/``pressure``, ``inside`` the coldness of the chamber's air.
-    """
-    outer, rho0, critical, knee, slope = p[at.COLDNESS, i], p[at.RHO0, i], p[at.CRITICAL, i], p[at.KNEE, i], p[at.LAMINAR, i]
-    fill = valves.driving_flow(
-        p[at.SUPPLY, i], p[at.INVERSE_SUPPLY, i], outer, pressure, inverse, inside, rho0, critical, knee, slope
-    )
-    drain = valves.driving_flow(
-        pressure, inverse, inside, p[at.ATMOSPHERE, i], p[at.INVERSE_ATMOSPHERE, i], outer, rho0, critical, knee, slope
-    )
-    return fill, drain
-
-
-@helper
-def orifice_flows(x: Array, p: Array, i: int, pressure: int, spool: int, inverse: float, inside: float) -> tuple[float, float]:
-    """Mass flows of a chamber given by its state rows: in from the supply and out to the atmosphere, kg/s.
-
-    ``inverse`` is 1/P of the chamber, ``inside`` the coldness of its air.
-    """
-    fill, drain = driving_flows(p, i, x[pressure, i], inverse, inside)
-    supply = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    exhaust = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    return supply * fill, exhaust * drain
-
-
-@helper
-def flows_of(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> tuple[float, float]:
-    """``orifice_flows`` of a chamber given by its state rows alone."""
-    return orifice_flows(x, p, i, pressure, spool, 1.0 / x[pressure, i], p[at.T0, i] / x[temperature, i])
-
-
-@helper
-def chamber_rates(
-    x: Array,
-    p: Array,
-    dx: Array,
-    i: int,
-    pressure: int,
-    temperature: int,
-    other: int,
-    spool: int,
-    area: int,
-    perimeter: int,
-    length: float,
-    length_rate: float,
-) -> None:
-    """Writes dP/dt and dT/dt of one chamber of lane ``i``; ``length`` is that of its air column, m."""
-    t = x[temperature, i]
-    volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
-    # One division serves the chamber: 1/(P V) = T inverse, 1/P = V T inverse, 1/T = P V inverse.
-    energy = x[pressure, i] * volume
-    inverse = 1.0 / (energy * t)
-    supplied, exhausted = orifice_flows(x, p, i, pressure, spool, volume * (t * inverse), p[at.T0, i] * (energy * inverse))
-    exchange(x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, supplied, exhausted, inverse)
-
-
-@helper
-def exchange(
-    x: Array,
-    p: Array,
-    dx: Array,
-    i: int,
-    pressure: int,
-    temperature: int,
-    other: int,
-    area: int,
-    perimeter: int,
-    length: float,
-    length_rate: float,
-    supplied: float,
-    exhausted: float,
-    inverse: float,
-) -> None:
-    """``chamber_rates`` under given flows from the supply and to the atmosphere, kg/s; ``inverse`` is 1/(P V T)."""
-    t, wall, gas = x[temperature, i], p[at.TEMPERATURE, i], p[at.GAS, i]
-    carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
-    heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
-    expansion = x[pressure, i] * (p[area, i] * length_rate)
-    pressing = chambers.pressing_power(carried, expansion, heat, gas, p[at.GAMMA, i])
-    dx[pressure] = pressing * (x[pressure, i] * (t * inverse))
-    dx[temperature] = chambers.warming_power(pressing, expansion, supplied - exhausted, gas, t) * (t * t * inverse)
 
 
 @helper
@@ -125,8 +39,11 @@ def piston_friction(
 
 
 @helper
-def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int) -> None:
-    """dx/dt (18,) of lane ``i``: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
+def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int, together: int) -> None:
+    """dx/dt (18,) of lane ``i``: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n).
+
+    ``together`` is that of ``air.air_rates``.
+    """
     y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
@@ -152,10 +69,7 @@ def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int) -> Non
     dx[at.V2] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
     dx[at.Z1], dx[at.Z2] = dz1, dz2
 
-    chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
-    chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
-    chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
-    chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
+    air.air_rates(x, p, dx, i, together)
     dx[at.S1P] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
     dx[at.S1N] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]
     dx[at.S2P] = (u[2, i] - x[at.S2P, i]) * p[at.SPOOL_RATE, i]
@@ -166,7 +80,7 @@ def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int) -> Non
 def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -> None:
     """``lane_rates`` of ``n`` lanes, (18, n)."""
     for i in range(n):
-        lane_rates(x, u, f, p, dx[:, i], i)
+        lane_rates(x, u, f, p, dx[:, i], i, 1)
 
 
 @helper
@@ -208,32 +122,26 @@ def derivatives(state: Array, command: Array, force: Array, parameters: Array, r
 
 
 @helper
-def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
-    """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
-    for i in range(state.shape[1]):
-        flows[0, i], flows[4, i] = flows_of(state, parameters, i, at.PP1, at.TP1, at.S1P)
-        flows[1, i], flows[5, i] = flows_of(state, parameters, i, at.PN1, at.TN1, at.S1N)
-        flows[2, i], flows[6, i] = flows_of(state, parameters, i, at.PP2, at.TP2, at.S2P)
-        flows[3, i], flows[7, i] = flows_of(state, parameters, i, at.PN2, at.TN2, at.S2N)
-
-
-@helper
-def stage(x: Array, u: Array, f: Array, p: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
+def stage(
+    x: Array, u: Array, f: Array, p: Array, total: Array, trial: Array, n: int, together: int, weight: float, ahead: float
+) -> None:
     """Adds ``weight`` times the rates at ``trial`` to ``total`` and puts the next trial state at x + ``ahead`` times them."""
     dx = column(STATES)
     for i in range(n):
-        lane_rates(trial, u, f, p, dx, i)
+        lane_rates(trial, u, f, p, dx, i, together)
         for row in range(STATES):
             total[row, i] += weight * dx[row]
             trial[row, i] = x[row, i] + ahead * dx[row]
 
 
 @helper
-def last_stage(x: Array, u: Array, f: Array, p: Array, total: Array, trial: Array, n: int, weight: float) -> None:
+def last_stage(
+    x: Array, u: Array, f: Array, p: Array, total: Array, trial: Array, n: int, together: int, weight: float
+) -> None:
     """The stage that ends a step: the state, and the first trial state of the next step, are the sum."""
     dx = column(STATES)
     for i in range(n):
-        lane_rates(trial, u, f, p, dx, i)
+        lane_rates(trial, u, f, p, dx, i, together)
         for row in range(STATES):
             total[row, i] += weight * dx[row]
             trial[row, i] = total[row, i]
@@ -264,11 +172,8 @@ def steps_in(time: float) -> int:
 
 
 @helper
-def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, n: int) -> None:
-    """Integrates ``n`` lanes of a state ``x`` by ``steps`` Runge-Kutta steps of ``step`` s under constant inputs.
-
-    ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop.
-    """
+def take_steps(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, n: int, together: int) -> None:
+    """``integrate`` with the chambers of a lane in vectors of ``together``, see ``air.air_rates``."""
     before, total, trial = scratch(STATES), scratch(STATES), scratch(STATES)
     copy(x, before, n)
     copy(x, total, n)
@@ -277,14 +182,27 @@ def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, i
         for k in range(STAGES):
             own = anew(p)
             if k < STAGES - 1 or WARP:
-                stage(before, u, f, own, total, trial, n, weight_of(k, step), ahead_of(k, step))
+                stage(before, u, f, own, total, trial, n, together, weight_of(k, step), ahead_of(k, step))
             else:
-                last_stage(before, u, f, own, total, trial, n, weight_of(k, step))
+                last_stage(before, u, f, own, total, trial, n, together, weight_of(k, step))
         if WARP:  # with one right-hand side, since two of them are too long for a thread's instructions to stay at hand
             copy(total, before, n)
             copy(total, trial, n)
         record_impacts(total, p, impacts, n)
     copy(total, x, n)
+
+
+@helper
+def integrate(x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, n: int) -> None:
+    """Integrates ``n`` lanes of a state ``x`` by ``steps`` Runge-Kutta steps of ``step`` s under constant inputs.
+
+    ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop. A lane that is alone has no others
+    that would fill a vector, but four chambers.
+    """
+    if WARP == 0 and (BLOCK == 1 or n == 1):
+        take_steps(x, u, f, p, steps, step, impacts, n, 4)
+    else:
+        take_steps(x, u, f, p, steps, step, impacts, n, 1)
 
 
 @kernel

@@ -14,7 +14,7 @@ kernels of ``dynamics``, which know none of them. With an option the state has f
 
 import numpy as np
 
-from birthsim_env.physics import dynamics, valves
+from birthsim_env.physics import air, dynamics, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -65,14 +65,25 @@ def lagged_chamber(
     length_rate: float,
 ) -> float:
     """Rates of a chamber behind a tube, where there is one; returns what its valve draws from the supply, kg/s."""
-    supplied, exhausted = dynamics.flows_of(x, p, i, pressure, temperature, spool)
+    supplied, exhausted = air.flows_of(x, p, i, pressure, temperature, spool)
     row = at.STATES + FLOWS + chamber
     rate = p[at.TUBE_RATE, i]
     dx[row], dx[row + 4] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
     if rate > 0.0:
         inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
-        dynamics.exchange(
-            x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, x[row, i], x[row + 4, i], inverse
+        dx[pressure], dx[temperature] = air.exchange(
+            p,
+            i,
+            x[pressure, i],
+            x[temperature, i],
+            x[other, i],
+            p[area, i],
+            p[perimeter, i],
+            length,
+            length_rate,
+            x[row, i],
+            x[row + 4, i],
+            inverse,
         )
     return supplied
 
@@ -203,4 +214,4 @@ def rest(state: Array, parameters: Array, further: Array) -> None:
     for i in range(state.shape[1]):
         further[RESERVOIR, i] = parameters[at.SOURCE, i]
     end_effector_motion(state, parameters, further[HANDLE:FLOWS])
-    dynamics.mass_flows(state, parameters, further[FLOWS:])
+    air.mass_flows(state, parameters, further[FLOWS:])
