@@ -116,11 +116,18 @@ def own(built, tmp_path):
     return Path(shutil.copytree(built, tmp_path / "own"))
 
 
+@pytest.fixture
+def looked_for(monkeypatch):
+    """Prebuilt code is looked for, whatever the environment says."""
+    monkeypatch.setattr(prebuilt, "USED", True)
+
+
 def run(folder, program, *arguments, **environment):
     """What a program says in a process that finds the two modules first."""
-    paths = os.pathsep.join(map(str, (folder, ROOT)))
+    paths = os.pathsep.join((str(folder), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])))
     line = [sys.executable, "-c", program, str(folder / "prebuilt"), *arguments]
-    environment = {**os.environ, "PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(folder / "kept"), **environment}
+    own = {"PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(folder / "kept"), "BIRTHSIM_PREBUILT": "1"}
+    environment = {**os.environ, **own, **environment}
     done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout and json.loads(done.stdout)
@@ -208,6 +215,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.usefixtures("looked_for")
 def test_a_library_that_is_no_good_is_not_opened(own, monkeypatch, damage):
     monkeypatch.setattr(prebuilt, "FOLDER", own / "prebuilt")
     change, signed = DAMAGES[damage]
@@ -222,12 +230,14 @@ def test_a_library_that_is_no_good_is_not_opened(own, monkeypatch, damage):
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"format": 1}', '{"format": 0, "libraries": {}, "kernels": {}}'])
+@pytest.mark.usefixtures("looked_for")
 def test_an_index_that_is_no_good_opens_nothing(own, monkeypatch, content):
     monkeypatch.setattr(prebuilt, "FOLDER", own / "prebuilt")
     (own / "prebuilt" / "index.json").write_text(content)
     assert not opened()
 
 
+@pytest.mark.usefixtures("looked_for")
 def test_nothing_is_opened_for_other_blocks_or_processors_or_where_it_is_missing(own, monkeypatch):
     monkeypatch.setattr(prebuilt, "FOLDER", own / "prebuilt")
     for name, value in (
