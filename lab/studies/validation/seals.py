@@ -60,13 +60,22 @@ def motion(file: Path) -> Array:
 
 
 @kernel
-def driven(moved: Array, numbers: Array, lugre: bool, found: Array) -> None:
-    """Friction (N) at every sample of ``motion``, of parameters in the order of ``NAMES``."""
-    f0, per_bar, ratio, stribeck, stiffness, viscous = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]
+def _driven(
+    speeds: Array,
+    pressures: Array,
+    f0: float,
+    per_bar: float,
+    ratio: float,
+    stribeck: float,
+    stiffness: float,
+    viscous: float,
+    lugre: bool,
+    found: Array,
+) -> None:
     deflection, steepness = 0.0, 1.0 / (1.0 - BREAKAWAY)
-    for k in range(moved.shape[1]):
-        speed, rate = moved[0, k], 0.0
-        coulomb = f0 + per_bar * moved[1, k]
+    for k in range(len(speeds)):
+        speed, rate = speeds[k], 0.0
+        coulomb = f0 + per_bar * pressures[k]
         weakness = friction.inverse_level(speed, coulomb, ratio * coulomb, stribeck)
         for _ in range(SUBSTEPS):
             rate = friction.bristle_rate_by_law(speed, deflection, weakness, stiffness, lugre, BREAKAWAY, steepness)
@@ -74,14 +83,18 @@ def driven(moved: Array, numbers: Array, lugre: bool, found: Array) -> None:
         found[k] = friction.lugre_force(speed, deflection, rate, stiffness, DAMPING, viscous)
 
 
+def driven(moved: Array, numbers: Array, lugre: bool = True) -> Array:
+    """Friction (N) at every sample of ``motion``, of parameters in the order of ``NAMES``, (T,)."""
+    speed, pressure, _ = moved
+    found = np.empty(len(speed))
+    _driven(speed, pressure, *map(float, numbers), lugre, found)
+    return found
+
+
 def errors(numbers: Array, moved: list[Array], lugre: bool = True) -> list[Array]:
     """Measured less modelled friction of each motion, N, less its median, which holds the offsets of both sensors."""
-    left = []
-    for one in moved:
-        found = np.empty(one.shape[1])
-        driven(one, np.ascontiguousarray(numbers, dtype=float), lugre, found)
-        left.append(one[2] - found - np.median(one[2] - found))
-    return left
+    left = (one[2] - driven(one, numbers, lugre) for one in moved)
+    return [one - np.median(one) for one in left]
 
 
 def fitted(moved: list[Array], by_pressure: bool, lugre: bool = True) -> Array:
