@@ -9,6 +9,7 @@ weight, which the gauges themselves have weighed, and, with an acceleration sens
 counts m a as a hand's force.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ def sense_rods(
         rods.force[0, i], rods.force[1, i] = world.force[0, i], world.force[1, i]
     if read:
         x, y = readings.position[0, i], readings.position[1, i]
-        r2 = np.sqrt(x * x + y * y)
+        r2 = math.sqrt(x * x + y * y)
         sin_seen, cos_seen = x / r2, -y / r2
         sin_gamma3, cos_gamma3, product = p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i], p[at.D_PRODUCT, i]
         r4 = geometry.length_r4(sin_seen, cos_seen, p[at.D_SQUARES, i], product, sin_gamma3, cos_gamma3)
