@@ -146,8 +146,8 @@ def rig_numbers(rig: Parameters) -> dict[str, Any]:
     return {
         "column": parameter_column(rig).tolist(),
         "coulomb": [one.coulomb_friction for one in cylinders],
+        "pressed": [one.pressure_friction for one in cylinders],
         "viscous": [one.viscous_friction for one in cylinders],
-        "static_ratio": rig.friction.static_ratio,
     }
 
 

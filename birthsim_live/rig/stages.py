@@ -21,8 +21,8 @@ def look_inside(x: Array, p: Array, rows: Array) -> None:
     State ``x`` (18, N), parameters ``p`` (PARAMETERS, N).
     """
     for i in range(x.shape[1]):
-        rows[0, i], _ = dynamics.piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
-        rows[1, i], _ = dynamics.piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
+        rows[0, i], _ = dynamics.piston_friction(x, p, i, 0)
+        rows[1, i], _ = dynamics.piston_friction(x, p, i, 1)
         for k in range(4):
             supplied, exhausted = air.flows_of(x, p, i, k)
             rows[2 + k, i] = supplied - exhausted

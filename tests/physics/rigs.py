@@ -34,6 +34,12 @@ OTHER = {
     **{"valves.critical_ratio": 0.4, "valves.time_constant": 0.003, "valves.leakage_ratio": 0.02},
     **{"air.supply_pressure": 6e5, "air.temperature": 300.0, "air.atmospheric_pressure": 0.95e5},
 }
+PRESSED = {
+    **{"cylinder1.coulomb_friction": 5.0, "cylinder1.pressure_friction": 9e-6, "cylinder1.direction_asymmetry": 0.25},
+    **{"cylinder2.coulomb_friction": 8.0, "cylinder2.pressure_friction": 5e-6, "cylinder2.direction_asymmetry": -0.15},
+}
+"""Friction that grows with the pressures and has a level for each direction."""
+
 DEMANDING = {
     **{"cylinder1.coulomb_friction": 25.0, "cylinder2.coulomb_friction": 6.0, "mechanics.mass": 2.0},
     **{"chambers.dead_volume": 5e-6, "chambers.wall_heat_transfer": 100.0, "valves.time_constant": 0.0015},

@@ -12,7 +12,7 @@ from birthsim_env.physics.runge_kutta import STAGES
 from birthsim_env.physics.step import METHOD
 from lab.studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
 from lab.studies.accuracy.second_model import SecondModel
-from tests.physics.rigs import CATALOGUE, DEMANDING, LAWS, OTHER, UNLIKE
+from tests.physics.rigs import CATALOGUE, DEMANDING, LAWS, OTHER, PRESSED, UNLIKE
 
 ELASTO_PLASTIC = {"friction.law": "elasto_plastic"}
 LATE_BREAKAWAY = {**ELASTO_PLASTIC, "friction.breakaway_ratio": 0.9}
@@ -61,6 +61,8 @@ CASES = {
     "elasto-plastic, other rig, strong": ({**OTHER, **LATE_BREAKAWAY}, strong, 1, (1.5e-7, 1e-6)),
     "elasto-plastic, demanding rig, strong": ({**DEMANDING, **ELASTO_PLASTIC}, strong, 1, (1e-7, 1e-6)),
     "Coulomb, stick-slip": ({"friction.law": "coulomb"}, stick_slip, 1, (1e-7, 1e-6)),
+    "pressed seals, stick-slip": (PRESSED, stick_slip, 1, (2e-8, 1e-7)),
+    "pressed seals, elasto-plastic, strong": ({**PRESSED, **ELASTO_PLASTIC}, strong, 1, (2e-7, 1e-6)),
     # The corners of sign(v) in (4) cost the default step more; smaller steps show that nothing else differs.
     "Coulomb, strong": ({"friction.law": "coulomb"}, strong, 1, (5e-6, 2e-5)),
     "Coulomb, strong, fine steps": ({"friction.law": "coulomb"}, strong, 16, (1e-7, 1e-6)),

@@ -96,8 +96,6 @@ class Parameters:
     electronics: Electronics = Electronics()
     ranges: tuple[tuple[str, float, float], ...] = ()
 
-    fs1 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder1.coulomb_friction)
-    fs2 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder2.coulomb_friction)
     tube_rate = derived("1/s", "c/L of the tubes", _tube_rate)
     vars().update(edge_rows())
 

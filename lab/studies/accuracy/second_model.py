@@ -38,7 +38,8 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     pivot = g.d3 * np.exp(1j * g.gamma3)
     linkage = np.array([pivot.real, pivot.imag, g.d6, g.k1, g.k2, m.mass, m.gravity])
     sizes = [(c.piston_diameter, c.rod_diameter, c.stroke) for c in cylinders]
-    pistons = np.array([(*size, c.coulomb_friction, c.viscous_friction) for size, c in zip(sizes, cylinders, strict=True)])
+    rubbing = [(c.coulomb_friction, c.pressure_friction, c.direction_asymmetry, c.viscous_friction) for c in cylinders]
+    pistons = np.array([(*size, *level) for size, level in zip(sizes, rubbing, strict=True)])
     bristle = f.bristle_stiffness, f.bristle_damping
     number = ("coulomb", "lugre", "elasto_plastic").index(f.law)
     law = np.array([number, f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio], dtype=float)
@@ -131,7 +132,7 @@ def rates(
 
     along = np.zeros(2)
     for c in range(2):
-        bore, rod, stroke, fc, fv = pistons[c]
+        bore, rod, stroke, unpressed, growth, asymmetry, fv = pistons[c]
         full, ring = np.pi / 4 * bore**2, np.pi / 4 * (bore**2 - rod**2)
         v, pressure, temperature = speed[c], np.zeros(2), np.zeros(2)
         volume, rate, wall = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -160,6 +161,8 @@ def rates(
             ds[8 + k] = enthalpy_rate - p * rate[side] + warming
             ds[14 + k] = (command[k] - spool) / valve[3]
 
+        fc = unpressed + growth * ((pressure[0] - atmosphere) + (pressure[1] - atmosphere))
+        fc = max(fc, 0.0) * (1 + asymmetry * np.sign(v))
         if law[0] > 0:
             level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
             alpha = 1.0 if law[0] == 1 else plastic_fraction(s[12 + c], v, level / law[3], law[6])

@@ -62,10 +62,10 @@ def test_every_number_of_the_plant_reaches_a_row() -> None:
 
 def test_who_reads_what() -> None:
     rig = Parameters()
-    assert parameters_read(lambda one: one.mechanics.mass + one.fs2, rig) == {
+    assert parameters_read(lambda one: one.mechanics.mass + one.tube_rate, rig) == {
         "mechanics.mass",
-        "friction.static_ratio",
-        "cylinder2.coulomb_friction",
+        "chambers.tube_length",
+        *("air.heat_capacity_ratio", "air.gas_constant", "air.temperature"),
     }
     assert parameters_read(lambda one: one.cylinder1.area_p, rig) == {"cylinder1.piston_diameter"}
 
