@@ -4,7 +4,6 @@ from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import block
 from birthsim_env.physics import air, dynamics
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
