@@ -51,13 +51,22 @@ def _root(part: float, slope: float, bend: float) -> float:
 
 
 @helper
+def _crossed(part: float, crossing: float) -> float:
+    """Part of the overlap that belongs to a ``part``: a parabola that ends level at ``crossing``."""
+    left = max(1.0 - part / crossing, 0.0)
+    return 1.0 - left * left
+
+
+@helper
 def opening_of(part: float, edge: Edge, crossing: float) -> float:
     """Opening in [0, 1] at which an edge opens a ``part``, at least 0, of the valve's conductance; 1 where it cannot.
 
-    Below ``crossing`` the overlap is added in proportion, so that a wish about zero does not throw the spool from side to side.
+    Below ``crossing`` not all of the overlap is added, so that a wish about zero does not throw the spool from side to side.
+    What then leaves the valve is less than the wish, and catches up with it on the way to ``crossing``: the sooner, the more
+    steeply, which loops answer by chatter. In proportion, as a ramp, the spool would turn five times as often at the same error.
     """
     beyond = _root(min(part, largest_part(edge)), edge.slope, edge.bend)
-    return min(beyond + edge.overlap * min(part / crossing, 1.0), 1.0)
+    return min(beyond + edge.overlap * _crossed(part, crossing), 1.0)
 
 
 @helper
@@ -73,5 +82,5 @@ def common_opening(part: float, share: float, one: Edge, other: Edge, crossing: 
     bend = weight * first.bend if alone else second.bend + weight * (first.bend - second.bend)
     reach, rest = 1.0 - start, part if alone else part - begun
     beyond = _root(min(rest, reach * (slope - bend * reach)), slope, bend)
-    opened = beyond + (start - first.overlap) + first.overlap * min(part / crossing, 1.0)
+    opened = beyond + (start - first.overlap) + first.overlap * _crossed(part, crossing)
     return max(0.0, min(1.0, opened))

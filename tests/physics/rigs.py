@@ -10,7 +10,7 @@ NO_FRICTION = {
     **{f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "viscous")},
     "friction.law": "coulomb",
 }
-CATALOGUE = {f"valves.{side}_{name}": value for side in ("supply", "exhaust") for name, value in MPYE_5_M5._asdict().items()}
+CATALOGUE = MPYE_5_M5.changes()
 """The curve of the paper's valve."""
 UNLIKE = {
     **CATALOGUE,

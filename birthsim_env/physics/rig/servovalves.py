@@ -25,6 +25,10 @@ class Curve(NamedTuple):
     overlap: Any
     curvature: Any
 
+    def changes(self) -> dict[str, Any]:
+        """The parameters of valves whose edges all have this curve, as ``Parameters.replace`` takes them."""
+        return {f"valves.{side}_{name}": value for side in ("supply", "exhaust") for name, value in self._asdict().items()}
+
 
 LINEAR = Curve(0.0, 0.0)
 MPYE_5_M5 = Curve(0.11, 0.43)
