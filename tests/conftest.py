@@ -33,7 +33,7 @@ HypothesisProvider._local_constants = Constants()
 # The same examples every time, and as long as a busy machine needs; make test-slow tries more, make fuzz others, mutants few.
 settings.register_profile("quick", deadline=None, derandomize=True, database=None)
 settings.register_profile("deep", settings.get_profile("quick"), derandomize=False, max_examples=50_000)
-settings.register_profile("slow", settings.get_profile("quick"), max_examples=4000)
+settings.register_profile("slow", settings.get_profile("quick"), max_examples=2000)
 settings.register_profile("brief", settings.get_profile("quick"), max_examples=5)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 MUTANTS = os.environ.get("HYPOTHESIS_PROFILE") == "brief"
