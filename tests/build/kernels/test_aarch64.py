@@ -36,6 +36,15 @@ def replay(tmp_path_factory):
     return lambda run: subprocess.run(line, input=run.record(), capture_output=True, check=True).stdout
 
 
+@pytest.fixture
+def looked_for(monkeypatch):
+    """Prebuilt code is looked for, whatever the environment says."""
+    monkeypatch.setattr(prebuilt, "USED", True)
+    prebuilt._opened.cache_clear()
+    yield
+    prebuilt._opened.cache_clear()
+
+
 def step(name, **how):
     env = gymnasium.make_vec(environment_id(name), num_envs=LANES, randomize=True, **how)
     env.reset(seed=0)
@@ -69,6 +78,7 @@ def is_fresh(run):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("looked_for")
 @pytest.mark.parametrize(("walk", "least"), [(environments, 10), (hands_and_rigs, 5), (controllers, 10)])
 def test_loops_have_the_same_bits(replay, monkeypatch, walk, least):
     runs = recorded(monkeypatch, walk)
