@@ -65,7 +65,7 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
     monkeypatch.setattr(estimate, "STILL", 1e-5)
     # Not where an overlap is none: there are no differences to both sides.
-    asked, theta = problem(), coordinates(TRUE.replace(Curve(0.01, 0.05).changes()), FREE_PARAMETERS)
+    asked, theta = problem(), coordinates(TRUE.replace(Curve(5e-4, 0.0).changes()), FREE_PARAMETERS)
     asked.jacobian(theta)  # whose slopes are those of where the start states end
     asked.residuals(theta + 1e-9)
     gradient = asked.jacobian(theta).T @ asked.residuals(theta)
