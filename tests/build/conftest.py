@@ -38,6 +38,11 @@ def library(tmp_path_factory):
     return _once(tmp_path_factory, HOST, *BUILT)
 
 
+@pytest.fixture(scope="session")
+def cortex(tmp_path_factory):
+    return _once(tmp_path_factory, "cortex-m7", "--controller", "admittance-backstepping", "--sensors", "ideal", "lab")
+
+
 @pytest.fixture
 def in_one_code(monkeypatch):
     """Programs have the code of all loops of ``tests.build.loops``, and rows for each, so that it is compiled once for all."""
