@@ -19,7 +19,7 @@ from birthsim_env.registry import names
 from tests.build.kernels.recorded import recorded
 from tests.build.targets import need_linker, need_program
 
-WORN = {"valves.deadband": 0.05, "valves.hysteresis": 0.04, "valves.opening_limit": 0.7}
+WORN = {"valves.supply_overlap": 0.05, "valves.hysteresis": 0.04, "valves.opening_limit": 0.7}
 OPTIONS = {"air.supply_conductance": 1e-8, "mechanics.mode_frequency": 20.0, "chambers.tube_length": 1.0}
 LANES = 33
 """A block, which is vectorised, and a lane of another."""
