@@ -39,22 +39,6 @@ def orifice_flows(p: Array, i: int, pressure: float, opening: float, inverse: fl
 
 
 @helper
-def flows_of(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> tuple[float, float]:
-    """``orifice_flows`` of a chamber given by its state rows alone."""
-    return orifice_flows(p, i, x[pressure, i], x[spool, i], 1.0 / x[pressure, i], p[at.T0, i] / x[temperature, i])
-
-
-@helper
-def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
-    """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
-    for i in range(state.shape[1]):
-        flows[0, i], flows[4, i] = flows_of(state, parameters, i, at.PP1, at.TP1, at.S1P)
-        flows[1, i], flows[5, i] = flows_of(state, parameters, i, at.PN1, at.TN1, at.S1N)
-        flows[2, i], flows[6, i] = flows_of(state, parameters, i, at.PP2, at.TP2, at.S2P)
-        flows[3, i], flows[7, i] = flows_of(state, parameters, i, at.PN2, at.TN2, at.S2N)
-
-
-@helper
 def exchange(
     p: Array,
     i: int,

@@ -23,6 +23,7 @@ from lab.studies.speed import twin
 ELSEWHERE = {
     "mechanics.impact_speed": "an episode reports impacts, which the plant only measures",
     "air.polytropic_index": "the control model's, with which controllers and starts compute",
+    "chambers.pressure_cells": "sensors measure there",
 }
 """Parameters of the plant's sections that move nothing, and who uses them."""
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 import tomli_w
 
 from birthsim_env.files import write_text
@@ -18,18 +17,11 @@ from birthsim_env.physics.rig.mechanical import Cylinder, Friction, Geometry, Me
 from birthsim_env.physics.rig.pneumatic import Air, Chambers, Valves
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
-from birthsim_env.physics.step import STEP
 
 __all__ = [
     "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters",
     "Valves", "load_parameters", "parameter_of", "value_of",
 ]  # fmt: skip
-
-
-def _tube_rate(rig: Any) -> Any:
-    air, length = rig.air, rig.chambers.tube_length
-    sound = np.sqrt(air.heat_capacity_ratio * air.gas_constant * air.temperature)
-    return np.where(np.greater(length, 0.0), sound / np.maximum(length, STEP.shortest_tube), 0.0)
 
 
 @dataclass(frozen=True)
@@ -91,7 +83,6 @@ class Parameters:
 
     fs1 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder1.coulomb_friction)
     fs2 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder2.coulomb_friction)
-    tube_rate = derived("1/s", "c/L of the tubes", _tube_rate)
 
     def __post_init__(self) -> None:
         for name, part in SECTIONS.items():
