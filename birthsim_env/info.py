@@ -82,7 +82,7 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
         for k in range(4):
             pressure, temperature = state[at.PRESSURES[k], i], state[at.TEMPERATURES[k], i]
             end, coldness = tubes.at_valve(p, i, world.at_valve[k, i], pressure, temperature)
-            inflow, _ = air.orifice_flows(p, i, end, state[at.SPOOLS[k], i], 1.0 / end, coldness)
+            inflow, _ = air.orifice_flows(p, i, k, end, state[at.SPOOLS[k], i], 1.0 / end, coldness)
             info.supply_flow[i] += max(inflow, 0.0)
     _describe_costs(world, info, n)
 

@@ -62,7 +62,6 @@ def tubed_chamber(
     pressure: int,
     temperature: int,
     other: int,
-    spool: int,
     area: int,
     perimeter: int,
     length: float,
@@ -71,7 +70,7 @@ def tubed_chamber(
     """Rates of a tube and of the chamber behind it, where there is one; returns what its valve draws from the supply, kg/s."""
     row, through, has_tube = at.STATES + TUBES + chamber, at.STATES + FLOWS + chamber, p[at.TUBE_LENGTH, i] > 0.0
     end, outer = tubes.at_valve(p, i, x[row, i], x[pressure, i], x[temperature, i])
-    supplied, exhausted = air.orifice_flows(p, i, end, x[spool, i], 1.0 / end, outer)
+    supplied, exhausted = air.orifice_flows(p, i, chamber, end, x[at.S1P + chamber, i], 1.0 / end, outer)
     flow = x[through, i]
     coldness = outer if end > x[pressure, i] else p[at.T0, i] / x[temperature, i]
     inertance, viscous = tube[tubes.INERTANCE, i], tube[tubes.VISCOUS, i]
@@ -123,11 +122,11 @@ def right_hand_side(
         y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
         half1, half2, rates = own[at.HALF_L1, i], own[at.HALF_L2, i], dx[:, i]
         drawn = tubed_chamber(
-            x, own, tube, rates, i, 0, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
-        ) + tubed_chamber(x, own, tube, rates, i, 1, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
+            x, own, tube, rates, i, 0, at.PP1, at.TP1, at.TN1, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
+        ) + tubed_chamber(x, own, tube, rates, i, 1, at.PN1, at.TN1, at.TP1, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
         drawn += tubed_chamber(
-            x, own, tube, rates, i, 2, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
-        ) + tubed_chamber(x, own, tube, rates, i, 3, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
+            x, own, tube, rates, i, 2, at.PP2, at.TP2, at.TN2, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
+        ) + tubed_chamber(x, own, tube, rates, i, 3, at.PN2, at.TN2, at.TP2, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
         source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
         filled = own[at.LINE, i] * valves.driving_flow(
             source,
@@ -226,7 +225,7 @@ def mass_flows(state: Array, further: Array, parameters: Array, flows: Array) ->
             pressure, temperature = state[at.PRESSURES[k], i], state[at.TEMPERATURES[k], i]
             end, coldness = tubes.at_valve(parameters, i, further[TUBES + k, i], pressure, temperature)
             opening = state[at.SPOOLS[k], i]
-            flows[k, i], flows[4 + k, i] = air.orifice_flows(parameters, i, end, opening, 1.0 / end, coldness)
+            flows[k, i], flows[4 + k, i] = air.orifice_flows(parameters, i, k, end, opening, 1.0 / end, coldness)
 
 
 @helper

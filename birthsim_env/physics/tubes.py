@@ -20,6 +20,7 @@ would follow within 0.1 ms, and an explicit step could not. ``docs/plant_options
 
 import math
 
+from birthsim_env.physics import air, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
@@ -81,6 +82,17 @@ def at_valve(p: Array, i: int, end: float, pressure: float, temperature: float) 
 
 
 @helper
+def widest(p: Array, i: int) -> float:
+    """The largest conductance that an edge of the valves can have, m3/(s Pa)."""
+    most, full, leakage = 0.0, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i]
+    for k in range(4):
+        supply = valves.edge_conductance(1.0, air.supply_edge(p, i, k), full, leakage)
+        exhaust = valves.edge_conductance(1.0, air.exhaust_edge(p, i, k), full, leakage)
+        most = max(most, max(supply, exhaust))
+    return most
+
+
+@helper
 def fill_constants(p: Array, constants: Array, n: int) -> None:
     """Fill ``constants`` (CONSTANTS, n) of the tubes of ``n`` lanes; those of a lane without are of no use.
 
@@ -90,7 +102,7 @@ def fill_constants(p: Array, constants: Array, n: int) -> None:
         length, diameter = max(p[at.TUBE_LENGTH, i], STEP.shortest_tube), p[at.TUBE_DIAMETER, i]
         area = 0.25 * math.pi * diameter * diameter
         gas_t, rho0 = p[at.GAS, i] * p[at.TEMPERATURE, i], p[at.RHO0, i]
-        quickest = gas_t * rho0 * math.sqrt(p[at.COLDNESS, i]) * p[at.CONDUCTANCE, i] * p[at.LAMINAR, i]
+        quickest = gas_t * rho0 * math.sqrt(p[at.COLDNESS, i]) * widest(p, i) * p[at.LAMINAR, i]
         volume = max(AT_VALVE * area * p[at.TUBE_LENGTH, i], quickest / STEP.fastest_tube)
         sonic = conductance(p[at.TUBE_LENGTH, i], diameter)
         critical = critical_ratio(sonic, diameter)

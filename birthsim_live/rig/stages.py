@@ -21,11 +21,11 @@ def look_inside(x: Array, p: Array, ends: Array, rows: Array) -> None:
     State ``x`` (18, N), parameters ``p`` (PARAMETERS, N), pressures at the ``ends`` of tubes (4, N).
     """
     for i in range(x.shape[1]):
-        rows[0, i], _ = dynamics.piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
-        rows[1, i], _ = dynamics.piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
+        rows[0, i], _ = dynamics.piston_friction(x, p, i, 0)
+        rows[1, i], _ = dynamics.piston_friction(x, p, i, 1)
         for k in range(4):
             end, coldness = tubes.at_valve(p, i, ends[k, i], x[at.PRESSURES[k], i], x[at.TEMPERATURES[k], i])
-            supplied, exhausted = air.orifice_flows(p, i, end, x[at.SPOOLS[k], i], 1.0 / end, coldness)
+            supplied, exhausted = air.orifice_flows(p, i, k, end, x[at.SPOOLS[k], i], 1.0 / end, coldness)
             rows[2 + k, i] = supplied - exhausted
 
 
