@@ -5,8 +5,7 @@ kernels of ``dynamics``, which know none of them. With an option the state has f
 
 - the pressure Ps in a reservoir of volume V, isothermal, which the valves draw from and an ISO 6358 line fills from the source:
   dPs/dt = r T (q(source, Ps) - sum of the valves' supply flows) / V. The line's critical ratio is the valves'.
-- flows into and out of each chamber, which follow those of the valve with a lag of the time that sound takes through the tube:
-  dq/dt = (q_valve - q) c / L. It stands for the delay L/c of Richer and Hurmuzlu 2000; their attenuation is left out.
+- the pressure at the valve's end of each tube, and the flow through it into the chamber (``tubes``).
 - position and velocity of the handle, a part ``mode_mass_fraction`` of the mass that hangs on the linkage's end by spring and
   damper: m_h dvh/dt = Fu - k (xh - xc) - d (vh - vc), k = m_h w^2, d = 2 zeta w m_h, w = 2 pi f. The handle's position is
   counted from where its weight holds it. Hand and tracker are at the handle.
@@ -14,7 +13,7 @@ kernels of ``dynamics``, which know none of them. With an option the state has f
 
 import numpy as np
 
-from birthsim_env.physics import air, dynamics, valves
+from birthsim_env.physics import air, dynamics, tubes, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -22,22 +21,26 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
-RESERVOIR, HANDLE, FLOWS = 0, 1, 5
-"""Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; flows of chambers P1, N1, P2, N2, kg/s, four
-from the supply and four to the atmosphere."""
+RESERVOIR, HANDLE, TUBES, FLOWS = 0, 1, 5, 9
+"""Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; of the tubes of chambers P1, N1, P2, N2 four
+pressures at the valves' ends, Pa, and four flows into the chambers, kg/s."""
 FURTHER = 13
 ALL = at.STATES + FURTHER
-SCRATCH = 4 * ALL + 6 + at.PARAMETERS
+SCRATCH = 4 * ALL + 6 + at.PARAMETERS + tubes.CONSTANTS
 
 
 def are_off(parameters: Array) -> bool:
     """Whether no lane has any of the options, (PARAMETERS, N)."""
-    return not parameters[[at.LINE, at.MODE_RATE, at.TUBE_RATE]].any()
+    return not parameters[[at.LINE, at.MODE_RATE, at.TUBE_LENGTH]].any()
 
 
 @helper
-def alter(p: Array, own: Array, n: int) -> None:
-    """Fill ``own`` (PARAMETERS, n), with which ``dynamics`` computes: without the handle's mass, but with all of the weight."""
+def alter(p: Array, own: Array, tube: Array, n: int) -> None:
+    """Fill ``own`` (PARAMETERS, n), with which ``dynamics`` computes: without the handle's mass, but with all of the weight.
+
+    ``tube`` (tubes.CONSTANTS, n) gets what the tubes' rates are computed from.
+    """
+    tubes.fill_constants(p, tube, n)
     for row in range(at.PARAMETERS):
         for i in range(n):
             own[row, i] = p[row, i]
@@ -49,9 +52,10 @@ def alter(p: Array, own: Array, n: int) -> None:
 
 
 @helper
-def lagged_chamber(
+def tubed_chamber(
     x: Array,
     p: Array,
+    tube: Array,
     dx: Array,
     i: int,
     chamber: int,
@@ -63,12 +67,18 @@ def lagged_chamber(
     length: float,
     length_rate: float,
 ) -> float:
-    """Rates of a chamber behind a tube, where there is one; returns what its valve draws from the supply, kg/s."""
-    supplied, exhausted = air.flows_of(x, p, i, chamber)
-    row = at.STATES + FLOWS + chamber
-    rate = p[at.TUBE_RATE, i]
-    dx[row], dx[row + 4] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
-    if rate > 0.0:
+    """Rates of a tube and of the chamber behind it, where there is one; returns what its valve draws from the supply, kg/s."""
+    row, through, has_tube = at.STATES + TUBES + chamber, at.STATES + FLOWS + chamber, p[at.TUBE_LENGTH, i] > 0.0
+    end, outer = tubes.at_valve(p, i, x[row, i], x[pressure, i], x[temperature, i])
+    supplied, exhausted = air.orifice_flows(p, i, chamber, end, x[at.S1P + chamber, i], 1.0 / end, outer)
+    flow = x[through, i]
+    coldness = outer if end > x[pressure, i] else p[at.T0, i] / x[temperature, i]
+    inertance, viscous = tube[tubes.INERTANCE, i], tube[tubes.VISCOUS, i]
+    resistance, critical = tube[tubes.RESISTANCE, i], tube[tubes.CRITICAL, i]
+    pushed = tubes.flow_rate(end, x[pressure, i], flow, coldness, inertance, viscous, resistance, critical)
+    dx[row] = tube[tubes.GAIN, i] * (supplied - exhausted - flow) if has_tube else 0.0
+    dx[through] = pushed if has_tube else 0.0
+    if has_tube:
         inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
         dx[pressure], dx[temperature] = air.exchange(
             p,
@@ -80,16 +90,18 @@ def lagged_chamber(
             p[perimeter, i],
             length,
             length_rate,
-            x[row, i],
-            x[row + 4, i],
+            flow,
+            0.0,
             inverse,
         )
     return supplied
 
 
 @helper
-def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pull: Array, dx: Array, n: int) -> None:
-    """dx/dt of ``n`` lanes: state (ALL, n), openings (4, n), user force (2, n), parameters from ``alter``.
+def right_hand_side(
+    x: Array, u: Array, f: Array, own: Array, tube: Array, motion: Array, pull: Array, dx: Array, n: int
+) -> None:
+    """dx/dt of ``n`` lanes: state (ALL, n), openings (4, n), user force (2, n), ``own`` and ``tube`` from ``alter``.
 
     Scratch: ``motion`` (4, n) of the linkage's end, and ``pull`` (2, n), the force on it.
     """
@@ -109,12 +121,12 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
     for i in range(n):
         y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
         half1, half2, rates = own[at.HALF_L1, i], own[at.HALF_L2, i], dx[:, i]
-        drawn = lagged_chamber(
-            x, own, rates, i, 0, at.PP1, at.TP1, at.TN1, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
-        ) + lagged_chamber(x, own, rates, i, 1, at.PN1, at.TN1, at.TP1, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
-        drawn += lagged_chamber(
-            x, own, rates, i, 2, at.PP2, at.TP2, at.TN2, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
-        ) + lagged_chamber(x, own, rates, i, 3, at.PN2, at.TN2, at.TP2, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
+        drawn = tubed_chamber(
+            x, own, tube, rates, i, 0, at.PP1, at.TP1, at.TN1, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
+        ) + tubed_chamber(x, own, tube, rates, i, 1, at.PN1, at.TN1, at.TP1, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
+        drawn += tubed_chamber(
+            x, own, tube, rates, i, 2, at.PP2, at.TP2, at.TN2, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
+        ) + tubed_chamber(x, own, tube, rates, i, 3, at.PN2, at.TN2, at.TP2, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
         source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
         filled = own[at.LINE, i] * valves.driving_flow(
             source,
@@ -149,15 +161,16 @@ def integrate(
     ``scratch`` is (SCRATCH, BLOCK).
     """
     x, dx, total, trial = scratch[:ALL], scratch[ALL : 2 * ALL], scratch[2 * ALL : 3 * ALL], scratch[3 * ALL : 4 * ALL]
-    motion, pull, own = scratch[4 * ALL : 4 * ALL + 4], scratch[4 * ALL + 4 : 4 * ALL + 6], scratch[4 * ALL + 6 :]
-    alter(p, own, n)
+    motion, pull, more = scratch[4 * ALL : 4 * ALL + 4], scratch[4 * ALL + 4 : 4 * ALL + 6], scratch[4 * ALL + 6 :]
+    own, tube = more[: at.PARAMETERS], more[at.PARAMETERS :]
+    alter(p, own, tube, n)
     dynamics.copy(state, x[: at.STATES], n)
     dynamics.copy(further, x[at.STATES :], n)
     for _ in range(steps):
         dynamics.copy(x, total, n)
         dynamics.copy(x, trial, n)
         for k in range(STAGES):
-            right_hand_side(trial, u, f, own, motion, pull, dx, n)
+            right_hand_side(trial, u, f, own, tube, motion, pull, dx, n)
             combine(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
         dynamics.copy(total, x, n)
         dynamics.record_impacts(x, p, impacts, n)
@@ -205,12 +218,24 @@ def port_motion(state: Array, further: Array, p: Array, motion: Array) -> None:
 
 
 @helper
+def mass_flows(state: Array, further: Array, parameters: Array, flows: Array) -> None:
+    """Writes the flows at the valves of chambers P1, N1, P2, N2: 0-3 from the supply, 4-7 to the atmosphere, kg/s, (8, N)."""
+    for k in range(4):
+        for i in range(state.shape[1]):
+            pressure, temperature = state[at.PRESSURES[k], i], state[at.TEMPERATURES[k], i]
+            end, coldness = tubes.at_valve(parameters, i, further[TUBES + k, i], pressure, temperature)
+            opening = state[at.SPOOLS[k], i]
+            flows[k, i], flows[4 + k, i] = air.orifice_flows(parameters, i, k, end, opening, 1.0 / end, coldness)
+
+
+@helper
 def rest(state: Array, parameters: Array, further: Array) -> None:
     """Writes the ``further`` rows (FURTHER, N) with which a state (18, N) begins, its supply that of the source.
 
-    The handle moves with the linkage, unbent, and what passes the valves passes the tubes.
+    The handle moves with the linkage, unbent, and the air in the tubes stands still at the chambers' pressures.
     """
     for i in range(state.shape[1]):
         further[RESERVOIR, i] = parameters[at.SOURCE, i]
-    end_effector_motion(state, parameters, further[HANDLE:FLOWS])
-    air.mass_flows(state, parameters, further[FLOWS:])
+        for chamber in range(4):
+            further[TUBES + chamber, i], further[FLOWS + chamber, i] = state[at.PRESSURES[chamber], i], 0.0
+    end_effector_motion(state, parameters, further[HANDLE:TUBES])

@@ -23,13 +23,12 @@ from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
 from birthsim_env.gradients.right_hand_side import RIG
 from birthsim_env.physics.compiled.lanes import PARAMETERS
+from tests.build.loops import LOOKS
 from tests.build.ptx_loops import functions_in, loops_in, memory_of
 from tests.build.targets import assert_fusing_changes_nothing, fill, need_threads
 
 SEED = 2_000_000
 WAY, PLANTS = "birthsim_env.parts.references:_path", "birthsim_env.loop.world"
-LOOKS = {"baselines.bench.measures:_measure", "baselines.bench.measures:_reward"}
-"""What measures an evaluation."""
 
 
 def begun(lanes, scenario="circle", controller=None, **arguments):

@@ -36,9 +36,9 @@ _UNITS = {"y": "m", "v": "m/s", "z": "m", "P": "Pa", "T": "K", "s": "1"}
 STATES = tuple(Signal(name, _UNITS[name[0]]) for name in at.STATE_NAMES)
 FURTHER = (
     Signal("Ps", "Pa"), Signal("xh", "m"), Signal("yh", "m"), Signal("vxh", "m/s"), Signal("vyh", "m/s"),
-    *(Signal(f"q{chamber}_{way}", "kg/s") for way in ("in", "out") for chamber in ("1P", "1N", "2P", "2N")),
+    *(Signal(f"{name}{chamber}", unit) for name, unit in (("Pv", "Pa"), ("q", "kg/s")) for chamber in ("1P", "1N", "2P", "2N")),
 )  # fmt: skip
-"""States of rigs with ``physics.options``: pressure at the valves, handle, flows at the chambers."""
+"""States of rigs with ``physics.options``: supply at the valves, handle, pressures at ends of tubes, flows in tubes."""
 INPUTS = (*(Signal(name, "1") for name in ("u1P", "u1N", "u2P", "u2N")), Signal("Fx", "N"), Signal("Fy", "N"))
 """Opening that each spool goes to, and the hand's force."""
 OUTPUTS = (
@@ -163,7 +163,7 @@ def linearize(
     x[list(at.PRESSURES)] = np.clip(pressure, low * (1 + EDGE), high * (1 - EDGE))
     x[list(at.TEMPERATURES)] = p[at.TEMPERATURE, 0]
     x[list(at.SPOOLS)] = u
-    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_RATE], 0] > 0.0)], [at.STATES, 1, 4, 8])
+    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_LENGTH], 0] > 0.0)], [at.STATES, 1, 4, 8])
     has_bristle = p[at.LUGRE, 0] + p[at.ELASTO_PLASTIC, 0] > 0.5
     ratio = p[at.STATIC_RATIO, 0] if has_bristle else 1.0
     if friction == "sliding":
