@@ -62,8 +62,8 @@ def opening_of(part: float, edge: Edge, crossing: float) -> float:
     """Opening in [0, 1] at which an edge opens a ``part``, at least 0, of the valve's conductance; 1 where it cannot.
 
     Below ``crossing`` not all of the overlap is added, so that a wish about zero does not throw the spool from side to side.
-    What then leaves the valve is less than the wish, and catches up with it on the way to ``crossing``: the sooner, the more
-    steeply, which loops answer by chatter. In proportion, as a ramp, the spool would turn five times as often at the same error.
+    What then leaves the valve is less than the wish, and catches up with it on the way to ``crossing``: the later, the more
+    steeply, which loops answer by chatter. A ramp catches up later than this parabola.
     """
     beyond = _root(min(part, largest_part(edge)), edge.slope, edge.bend)
     return min(beyond + edge.overlap * _crossed(part, crossing), 1.0)

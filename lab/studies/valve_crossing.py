@@ -1,8 +1,8 @@
 """Over what part of full flow controllers cross the overlap of their valves: wear against error, ``valves.crossing``.
 
 All valves have the catalogue's curve, which the controller knows. A narrow crossing follows every wish of the controller and
-throws spools from side to side about zero flow; a wide one leaves small wishes to the overlap. Wear is how often the command of a
-valve turns while a head is held and pushed (Probe), the error that of circles. The crossing was chosen on the worlds from
+throws spools from side to side about zero flow; a wide one leaves small wishes to the overlap. Wear is how often the command of
+a valve turns while a head is held and pushed (Probe), the error that of circles. The crossing was chosen on the worlds from
 ``CHOSEN`` on; those of the option ``seed`` judge it.
 """
 

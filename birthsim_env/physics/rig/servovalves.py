@@ -78,7 +78,7 @@ class Valves(Section):
         "s",
         "time constant of a spool",
         default=0.004,
-        source="assumed; -3 dB at 40 Hz",
+        source="assumed, -3 dB at 40 Hz; the data sheet has 125 Hz for the spool of an MPYE-5-M5, 1.3 ms (docs/valves.md)",
         least=2e-4,
         most=10,
         range=(0.0015, 0.008),
@@ -95,6 +95,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.overlap,
         on_request=True,
+        identified=Prior(5.0, scale=0.01),
         row=None,
     )
     supply_curvature: float = parameter(
@@ -107,6 +108,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.curvature,
         on_request=True,
+        identified=Prior(2.5, scale=0.1),
         row=None,
     )
     exhaust_overlap: float = parameter(
@@ -119,6 +121,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.overlap,
         on_request=True,
+        identified=Prior(5.0, scale=0.01),
         row=None,
     )
     exhaust_curvature: float = parameter(
@@ -131,6 +134,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.curvature,
         on_request=True,
+        identified=Prior(2.5, scale=0.1),
         row=None,
     )
     exhaust_ratio: float = parameter(
