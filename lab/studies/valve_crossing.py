@@ -87,7 +87,7 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 def _cost(rows: list[dict[str, Any]], sensors: str, crossing: float) -> float:
-    """By how much, in parts, a ``crossing`` has a larger settled error than valves without overlap, on the worlds that judge."""
+    """By which part a ``crossing`` has a larger settled error than valves without overlap, on the worlds that judge."""
     settled = {row["crossing"]: row["settled"][0] for row in rows if (row["sensors"], row["worlds"]) == (sensors, "judged")}
     return float(settled[crossing] / settled[None] - 1.0)
 
