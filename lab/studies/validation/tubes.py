@@ -20,6 +20,9 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
 FOLDER = "tubes"
+NEAR, FAR = range(2)
+"""Ends of a tube: the valve's and the dead one."""
+
 SUPPLIES, LENGTHS, FITTED = (3, 5, 7), tuple(range(1, 9)), (1, 2, 3)
 """bar gauge; m; m of the tubes that the model is fitted on."""
 
@@ -100,7 +103,7 @@ def dead_ended(
             rate = tubes.flow_rate(end, beyond, flow, 1.0, inertance, viscous, resistance, own)
             end, beyond = end + step * gas_t / near * (entering - flow), beyond + step * gas_t / far * flow
             flow, time = flow + step * rate, time + step
-        ends[0, k], ends[1, k] = end, beyond
+        ends[NEAR, k], ends[FAR, k] = end, beyond
 
 
 def files_of(data: Path, length: int, supply: int, way: str) -> list[Path]:
