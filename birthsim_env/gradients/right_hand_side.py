@@ -12,7 +12,7 @@ from birthsim_env.gradients.tracing import call
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 
-RIG = tuple(row for row in range(at.DEADBAND) if row not in (at.LUGRE, at.ELASTO_PLASTIC))
+RIG = tuple(row for row in range(at.DEADBAND) if row not in (at.LUGRE, at.GMS, at.BRISTLED, at.ATTRACTION))
 """Rows of the parameters that there are gradients to: all of a rig without options and with valves that open as commanded."""
 
 INPUTS = at.STATES + 4 + 2

@@ -36,7 +36,8 @@ def _traced(has_options: bool) -> tuple[Graph, list[Scalar]]:
     if has_options:
         own = empty(at.PARAMETERS)
         call(options.alter, p, own, 1)
-        call(options.right_hand_side, x, u, f, own, empty(4), empty(2), rates, 1)
+        rates[at.STATES + options.BRISTLES :] = 0.0
+        call(options.right_hand_side, x, u, f, own, empty(4), empty(2), empty(2), rates, 1)
         call(options.port_motion, x[: at.STATES], x[at.STATES :], p, motion)
     else:
         call(dynamics.right_hand_side, x, u, f, p, rates, 1)
