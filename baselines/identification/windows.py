@@ -184,7 +184,7 @@ def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: fl
 
 
 def admitted_openings(trial: Trial, column: Array) -> Array:
-    """What the openings of a log (4, T) become behind deadband and limit of the valves."""
+    """What the openings of a log (4, T) become behind the limit of the valves."""
     if are_perfect(column[:, None]):
         return trial.openings
     lanes, opening = trial.openings.shape[1], np.empty_like(trial.openings)

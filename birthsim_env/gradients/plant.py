@@ -44,7 +44,7 @@ def require_plain(plant: Plant) -> None:
             "friction.law with the choice 'gms'",
         ]
     if not spools.are_perfect(p):
-        names += ["valves.deadband", "valves.hysteresis", "valves.opening_limit"]
+        names += ["valves.hysteresis", "valves.opening_limit"]
     if names:
         raise ValueError(f"gradients of a rig with one of {', '.join(names)}; allowed: these at their defaults")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics import dynamics, options
+from birthsim_env.physics import dynamics, maxwell_slip
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
@@ -15,12 +15,15 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
+ROWS = at.STATES + maxwell_slip.ROWS
+"""Of a state with the elements of ``maxwell_slip``."""
+
 
 @helper
 def _friction(x: Array, p: Array, dx: Array, cylinder: int) -> float:
-    """Friction, N, with the rates of the bristles in ``dx`` (ALL, 1)."""
+    """Friction, N, with the rates of the bristles in ``dx`` (ROWS, 1)."""
     if p[at.GMS, 0] > 0.5:
-        force, rate = options.element_friction(x, p, dx, 0, cylinder)
+        force, rate = maxwell_slip.piston_friction(x, p, dx, 0, cylinder, at.STATES)
     else:
         force, rate = dynamics.piston_friction(x, p, 0, cylinder)
     dx[at.Z1 + cylinder, 0] = rate
@@ -30,8 +33,8 @@ def _friction(x: Array, p: Array, dx: Array, cylinder: int) -> float:
 @kernel
 def _rub(times: Array, speed: Array, pressures: Array, p: Array, cylinder: int, longest: float, forces: Array) -> None:
     """Writes friction (T,); speed and pressures are straight lines between samples, and constant within a step."""
-    x, dx, total = np.zeros((options.ALL, 1)), np.zeros((options.ALL, 1)), np.zeros((options.ALL, 1))
-    trial, v, pp = np.zeros((options.ALL, 1)), at.V1 + 2 * cylinder, at.PP1 + 4 * cylinder
+    x, dx, total = np.zeros((ROWS, 1)), np.zeros((ROWS, 1)), np.zeros((ROWS, 1))
+    trial, v, pp = np.zeros((ROWS, 1)), at.V1 + 2 * cylinder, at.PP1 + 4 * cylinder
     for t in range(len(times)):
         if t > 0:
             steps = int((times[t] - times[t - 1]) / longest) + 1
@@ -47,7 +50,7 @@ def _rub(times: Array, speed: Array, pressures: Array, p: Array, cylinder: int, 
                     _friction(trial, p, dx, cylinder)
                     total += weight_of(stage, step) * dx
                     trial[:] = x + ahead_of(stage, step) * dx
-                options.switch_elements(x, total, p, step, 1)
+                maxwell_slip.switch_elements(x, total, p, at.STATES, step, 1)
                 x[:] = total
         x[v, 0], x[pp, 0], x[pp + 2, 0] = speed[t], pressures[0, t], pressures[1, t]
         forces[t] = _friction(x, p, dx, cylinder)

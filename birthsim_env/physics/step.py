@@ -32,13 +32,16 @@ class Step(NamedTuple):
     Infinite: not looked at. Only the largest valves on the smallest chambers come near."""
 
     shortest_tube: float
-    """m. A shorter tube has the lag of one of this length."""
+    """m. The air of a shorter tube has the inertia of one of this length."""
+
+    fastest_tube: float
+    """1/s at most of the pressure at a tube's end behind an open valve and close to the pressure beyond it."""
 
 
 STEPS = {
-    "rk4": Step(0.25e-3, 8000.0, 5000.0, 7000.0, math.inf, 0.05),
-    "rk3": Step(1e-3 / 3, 4500.0, 3750.0, 6300.0, 6800.0, 0.07),
-    "fine": Step(1e-3 / 16, 8000.0, 5000.0, 7000.0, math.inf, 0.05),
+    "rk4": Step(0.25e-3, 8000.0, 5000.0, 7000.0, math.inf, 0.15, 6000.0),
+    "rk3": Step(1e-3 / 3, 4500.0, 3750.0, 6300.0, 6800.0, 0.2, 4500.0),
+    "fine": Step(1e-3 / 16, 8000.0, 5000.0, 7000.0, math.inf, 0.15, 6000.0),
 }
 DEFAULT = "rk4"
 

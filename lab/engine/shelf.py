@@ -63,7 +63,7 @@ def state(name: str) -> str:
         return "not measured yet"
     files = changed(content, study.measuring)
     listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
-    usual = json.loads(json.dumps(study.options))
+    usual = json.loads(json.dumps(study.kept_settings(study.options)))
     other = {key: value for key, value in content["settings"].items() if key not in usual or value != usual[key]}
     said = "".join(_unlike(key, value, usual.get(key)) for key, value in other.items())
     return (f"stale; changed: {listed}" if files else "fresh") + said
@@ -126,4 +126,8 @@ def renew() -> None:
     """Run what is not fresh or was measured with other settings, each with its own defaults."""
     for name in names():
         if state(name) != "fresh":
-            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True, cwd=ROOT)
+            if asked := declared(name).places:
+                options = " ".join(f"--{option} FOLDER" for option in asked)
+                print(f"{name} is left as it is: it needs measured data, birthsim study {name} {options}")
+            else:
+                subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True, cwd=ROOT)

@@ -69,6 +69,9 @@ class Study:
     A result is fresh while all that ``tasks``, ``keep`` and ``further`` call is as it was, what they call by name, and the
     entries of the registry that they asked for. ``beside`` are functions and classes that measure too, but that none of them
     names, such as an environment of ``agents`` that is made by its id.
+
+    Options that are ``places`` name a folder of the user's with measured data, which are not the project's to keep. A result
+    does not hold such a path, and ``birthsim study renew`` leaves the study to who has the data.
     """
 
     options: dict[str, Any]
@@ -85,11 +88,16 @@ class Study:
     further: Callable[[Options, Found], dict[Any, Task]] = no_more
     write: Callable[[Options, Found, Path], list[str]] = no_files
     beside: tuple[Callable[..., Any], ...] = ()
+    places: tuple[str, ...] = ()
 
     @property
     def measuring(self) -> tuple[Callable[..., Any], ...]:
         """The functions whose code decides what is kept."""
         return (self.tasks, self.keep, self.further, *self.beside)
+
+    def kept_settings(self, options: dict[str, Any]) -> dict[str, Any]:
+        """What a result says of its options."""
+        return {name: value for name, value in options.items() if name not in self.places}
 
     def settings(self, measures: str) -> type[Processes]:
         """Its options as a command's settings, whose help says what it ``measures``."""
@@ -132,7 +140,7 @@ class Study:
                 "pieces": len(tasks),
                 "pieces_kept": kept,
                 "failed": failures,
-                "settings": vars(options),
+                "settings": self.kept_settings(vars(options)),
                 "units": self.units,
                 "figures": figures,
             }

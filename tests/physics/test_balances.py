@@ -8,20 +8,20 @@ from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.bookkeeper import GAMMA, KEEPING, Bookkeeper, P, Volumes
-from tests.physics.rigs import PRESSED
+from tests.physics.rigs import PRESSED, UNLIKE
 
 RIG = Parameters()
 
 
-def gap(step: float, collide: bool) -> float:
+def gap(step: float, collide: bool, rig: Parameters = RIG) -> float:
     """Largest relative gap between books and chambers over 0.2 s with random valves and pushes."""
     rng, lanes = np.random.default_rng(0), 6
-    keeper = Bookkeeper(RIG, lanes, step)
+    keeper = Bookkeeper(rig, lanes, step)
     if collide:
         start = keeper.plant.state.copy()
         outward = rng.choice([-1.0, 1.0], (2, lanes))
         start[[Y1, Y2]], start[[V1, V2]] = outward * [[0.08], [0.17]], 0.6 * outward
-        keeper = Bookkeeper(RIG, lanes, step, start)
+        keeper = Bookkeeper(rig, lanes, step, start)
     deepest = np.zeros((2, lanes))
     for _ in range(2):
         command, push = rng.uniform(-1, 1, (4, lanes)), rng.uniform(-100, 100, (2, lanes))
@@ -37,6 +37,10 @@ def test_the_books_close_with_the_fourth_order_of_the_step(collide: bool) -> Non
     coarse, fine = (gap(factor * KEEPING, collide) for factor in ((1, 0.5) if collide else (2, 1)))
     assert fine < 1e-7
     assert coarse > 8 * fine
+
+
+def test_the_books_close_with_valves_of_which_no_edge_is_as_another() -> None:
+    assert gap(KEEPING, False, RIG.replace(UNLIKE)) < 1e-7
 
 
 def test_insulated_shut_chambers_keep_their_adiabat() -> None:

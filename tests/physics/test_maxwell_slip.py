@@ -10,7 +10,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.driven_friction import friction_along
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.maxwell_slip import ELEMENTS, REACH, STIFFNESS
+from birthsim_env.physics.maxwell_slip import ELEMENTS, MOVING, REACH, STIFFNESS
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.step import METHOD
@@ -82,7 +82,7 @@ def test_a_plant_moves_as_the_second_model_and_nearer_with_finer_steps(name: str
         for plant, found in ((coarse, worst), (fine, finer)):
             position = np.abs(plant.end_effector()[:2, 0] - model.state[:2]).max()
             found[:] = np.maximum(found, [position, np.abs(plant.pressures[:, 0] / model.pressures - 1).max()])
-        bent = fine.memory[4 + options.BRISTLES : 4 + options.SLIPS, 0]
+        bent = fine.memory[4 + options.BRISTLES : 4 + options.BRISTLES + MOVING, 0]
         np.testing.assert_allclose(bent * S0 * np.tile(STIFFNESS, 2), model.state[18:], atol=0.01)
         spread = max(spread, float(np.ptp(bent[:ELEMENTS])))
     assert np.all(worst < np.multiply(allowed, 4 if METHOD == "rk3" else 1)), worst
@@ -173,8 +173,8 @@ def test_friction_takes_energy_and_gives_back_no_more_than_bristles_hold(amplitu
 def test_a_start_in_motion_slips_steadily_and_one_at_rest_is_loaded_from_rest() -> None:
     plant = Plant(RIG, 3)
     plant.state = balanced_state(plant.lane_parameters, np.zeros((2, 3)), np.array([[0.1, -0.002, 0.0]] * 2))
-    bent = plant.memory[4 + options.BRISTLES : 4 + options.SLIPS].reshape(2, ELEMENTS, 3)
-    ways = plant.memory[4 + options.SLIPS :].reshape(2, ELEMENTS, 3)
+    bent = plant.memory[4 + options.BRISTLES : 4 + options.BRISTLES + MOVING].reshape(2, ELEMENTS, 3)
+    ways = plant.memory[4 + options.BRISTLES + MOVING :].reshape(2, ELEMENTS, 3)
     np.testing.assert_allclose(np.einsum("e,cel->cl", STIFFNESS, bent), plant.state[[at.Z1, at.Z2]], rtol=1e-12)
     np.testing.assert_array_equal(bent[:, :, 2], 0.0)
     for lane, sign in ((0, 1.0), (1, -1.0)):
@@ -183,7 +183,7 @@ def test_a_start_in_motion_slips_steadily_and_one_at_rest_is_loaded_from_rest() 
     state = plant.state.copy()
     state[[at.V1, at.V2]], state[[at.Z1, at.Z2]] = 0.0, 0.5 * FS / S0
     plant.state = state
-    bent = plant.memory[4 + options.BRISTLES : 4 + options.SLIPS].reshape(2, ELEMENTS, 3)
+    bent = plant.memory[4 + options.BRISTLES : 4 + options.BRISTLES + MOVING].reshape(2, ELEMENTS, 3)
     np.testing.assert_allclose(np.einsum("e,cel->cl", STIFFNESS, bent), 0.5 * FS / S0, rtol=1e-12)
     assert np.all(np.diff(bent, axis=1) >= 0)
 

@@ -12,7 +12,7 @@ from birthsim_env.physics.runge_kutta import STAGES
 from birthsim_env.physics.step import METHOD
 from lab.studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
 from lab.studies.accuracy.second_model import SecondModel
-from tests.physics.rigs import DEMANDING, LAWS, OTHER, PRESSED
+from tests.physics.rigs import CATALOGUE, DEMANDING, LAWS, OTHER, PRESSED, UNLIKE
 
 ELASTO_PLASTIC = {"friction.law": "elasto_plastic"}
 LATE_BREAKAWAY = {**ELASTO_PLASTIC, "friction.breakaway_ratio": 0.9}
@@ -48,12 +48,15 @@ def differences(rig: Parameters, sequence: Motion, refinement: int) -> tuple[Arr
 
 
 CASES = {
-    # Position (m) and pressure (relative), about twice what was measured; the aim is 1e-7 and 1e-6.
+    # Position (m) and pressure (relative), about twice what was measured; the aim is 1e-7 and 1e-6. Where a spool leaves its
+    # overlap the flow has a corner, which costs a step some accuracy.
     "default, stick-slip": ({}, stick_slip, 1, (2e-8, 1e-7)),
     "default, strong": ({}, strong, 1, (1e-7, 1e-6)),
     "other rig, stick-slip": (OTHER, stick_slip, 1, (2e-8, 1e-7)),
     "other rig, strong": (OTHER, strong, 1, (1e-7, 1e-6)),
     "demanding rig, strong": (DEMANDING, strong, 1, (3e-7, 2e-6)),
+    "catalogue's valves, strong": (CATALOGUE, strong, 1, (3e-7, 2e-6)),
+    "unlike valves, strong": (UNLIKE, strong, 1, (3e-7, 2e-6)),
     "elasto-plastic, stick-slip": (ELASTO_PLASTIC, stick_slip, 1, (5e-9, 3e-8)),
     "elasto-plastic, other rig, strong": ({**OTHER, **LATE_BREAKAWAY}, strong, 1, (1.5e-7, 1e-6)),
     "elasto-plastic, demanding rig, strong": ({**DEMANDING, **ELASTO_PLASTIC}, strong, 1, (1e-7, 1e-6)),
@@ -69,6 +72,8 @@ THIRD_ORDER = {
     "default, strong": (4e-7, 3e-6),
     "other rig, strong": (3e-7, 1e-6),
     "demanding rig, strong": (4e-7, 3e-6),
+    "catalogue's valves, strong": (5e-7, 3e-6),
+    "unlike valves, strong": (5e-7, 3e-6),
     "elasto-plastic, stick-slip": (1e-8, 7e-8),
     "elasto-plastic, other rig, strong": (1.4e-6, 7e-6),
     "elasto-plastic, demanding rig, strong": (5e-7, 4e-6),

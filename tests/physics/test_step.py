@@ -106,8 +106,10 @@ def test_the_plant_takes_three_steps_of_third_order_and_its_derivatives_are_thei
 
 @pytest.mark.slow
 def test_the_physics_holds_with_the_other_step() -> None:
-    """All tests of the plant and of its derivatives, compiled for steps of third order."""
-    rooms = ("tests/physics", "tests/gradients/test_plant.py", "tests/gradients/test_loop.py", "tests/bench/test_twin.py")
+    """All tests that integrate, and those of derivatives, compiled for steps of third order."""
+    integrating = ("balances", "chambers", "dynamics", "equilibrium", "friction", "linear", "mechanics", "second_model")
+    rooms = ("tests/physics/plant", *(f"tests/physics/test_{name}.py" for name in integrating))
+    rooms += ("tests/gradients/test_plant.py", "tests/gradients/test_loop.py", "tests/bench/test_twin.py")
     line = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not slow", *rooms]
     done = run(*line, BIRTHSIM_STEP="rk3")
     assert done.returncode == 0, done.stdout[-3000:]

@@ -36,11 +36,11 @@ _UNITS = {"y": "m", "v": "m/s", "z": "m", "P": "Pa", "T": "K", "s": "1"}
 STATES = tuple(Signal(name, _UNITS[name[0]]) for name in at.STATE_NAMES)
 FURTHER = (
     Signal("Ps", "Pa"), Signal("xh", "m"), Signal("yh", "m"), Signal("vxh", "m/s"), Signal("vyh", "m/s"),
-    *(Signal(f"q{chamber}_{way}", "kg/s") for way in ("in", "out") for chamber in ("1P", "1N", "2P", "2N")),
+    *(Signal(f"{name}{chamber}", unit) for name, unit in (("Pv", "Pa"), ("q", "kg/s")) for chamber in ("1P", "1N", "2P", "2N")),
     *(Signal(f"z{cylinder}_{element}", "m") for cylinder in (1, 2) for element in range(1, ELEMENTS + 1)),
     *(Signal(f"slips{cylinder}_{element}", "1") for cylinder in (1, 2) for element in range(1, ELEMENTS + 1)),
 )  # fmt: skip
-"""States of rigs with ``physics.options``: pressure at the valves, handle, flows at the chambers, elements of the bristles."""
+"""States of rigs with ``physics.options``: supply at the valves, handle, ends of tubes, flows in them, elements of bristles."""
 INPUTS = (*(Signal(name, "1") for name in ("u1P", "u1N", "u2P", "u2N")), Signal("Fx", "N"), Signal("Fy", "N"))
 """Opening that each spool goes to, and the hand's force."""
 OUTPUTS = (
@@ -166,7 +166,7 @@ def linearize(
     x[list(at.TEMPERATURES)] = p[at.TEMPERATURE, 0]
     x[list(at.SPOOLS)] = u
     # The mean bristle of a stuck piston is that of its elements.
-    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_RATE], 0] > 0.0), False], [at.STATES, 1, 4, 8, 4 * ELEMENTS])
+    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_LENGTH], 0] > 0.0), False], [at.STATES, 1, 4, 8, 4 * ELEMENTS])
     has_bristle = p[at.BRISTLED, 0] > 0.5
     ratio = p[at.STATIC_RATIO, 0] if has_bristle else 1.0
     if friction == "sliding":

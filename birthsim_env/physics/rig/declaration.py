@@ -181,6 +181,7 @@ class Section:
     """A group of parameters: it checks every value by name, and lists its parameters in the docstring of each subclass.
 
     A subclass that is not of the ``plant`` has no rows in kernels of the rig; one that is ``shared`` is the same in all lanes.
+    What a section declares comes before what it takes from the section that it derives from.
     """
 
     parameters: ClassVar[Mapping[str, Parameter]]
@@ -190,7 +191,8 @@ class Section:
         """Collect what is declared, and append it to the docstring."""
         fields = {name: one.metadata["declared"] for name, one in vars(cls).items() if isinstance(one, dataclasses.Field)}
         more = {**({} if plant else {"row": None}), **({"shared": True} if shared else {})}
-        cls.parameters = {name: dataclasses.replace(one, **more) for name, one in fields.items()}
+        own = {name: dataclasses.replace(one, **more) for name, one in fields.items()}
+        cls.parameters = {**own, **getattr(cls, "parameters", {})}
         cls.derived = {name: one for name, one in vars(cls).items() if isinstance(one, Derived)}
         lines = [cls.__doc__ or "", "", LISTED, ""]
         for name, one in cls.parameters.items():

@@ -37,7 +37,7 @@ ELEMENT_SCALES = np.ones(2 * ELEMENTS)
 
 
 def constants(rig: Parameters) -> tuple[Array, ...]:
-    """Numbers of a rig: linkage, mass, friction per cylinder, its law, chambers, valves, air.
+    """Numbers of a rig: linkage, mass, friction per cylinder, its law, chambers, valves, their edges, air.
 
     The last numbers of the law are the way in which each element slips, 1 or -1, and 0 of those that stick.
     """
@@ -54,10 +54,17 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     law = np.array([number, *numbers, *np.zeros(2 * ELEMENTS)], dtype=float)
     heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
     valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
+    edges = np.empty((4, 2, 3))  # overlap, curvature and share of the edges to supply and exhaust
+    for k, own in enumerate((rig.valve_p1, rig.valve_n1, rig.valve_p2, rig.valve_n2)):
+        to_supply = v.supply_overlap + own.supply_overlap, v.supply_curvature + own.supply_curvature
+        to_exhaust = v.exhaust_overlap + own.exhaust_overlap, v.exhaust_curvature + own.exhaust_curvature
+        edges[k, 0] = *to_supply, 1 + own.supply_conductance
+        edges[k, 1] = *to_exhaust, v.exhaust_ratio * (1 + own.exhaust_conductance)
+    edges[:, :, 0] = edges[:, :, 0].clip(0)
     around = air.supply_pressure, air.atmospheric_pressure, air.temperature
     reference = air.reference_density, air.reference_temperature
     gas = np.array([*around, air.gas_constant, air.heat_capacity_ratio, *reference])
-    return linkage, pistons, law, heat, valve, gas
+    return linkage, pistons, law, heat, valve, edges, gas
 
 
 def compiled(function: F) -> F:
@@ -78,6 +85,17 @@ def orifice(conductance: float, p_up: float, t_up: float, p_down: float, b: floa
         psi = np.sqrt(1 - ((0.99 - b) / (1 - b)) ** 2) * (1 - x) * 100
     flow: float = conductance * rho * p_up * np.sqrt(t_ref / t_up) * psi
     return flow
+
+
+@compiled
+def opened(stroke: float, edge: Array) -> float:
+    """Part of the conductance that an edge opens after a stroke towards it: nothing within the overlap, then a parabola."""
+    overlap, curvature, share = edge
+    if stroke <= overlap:
+        return 0.0
+    t = (stroke - overlap) / (1 - overlap)
+    part: float = share * t * (1 + curvature * (1 - t))
+    return part
 
 
 @compiled
@@ -103,10 +121,19 @@ def element_rate(
 
 @compiled
 def rates(
-    s: Array, command: Array, push: Array, linkage: Array, pistons: Array, law: Array, heat: Array, valve: Array, gas: Array
+    s: Array,
+    command: Array,
+    push: Array,
+    linkage: Array,
+    pistons: Array,
+    law: Array,
+    heat: Array,
+    valve: Array,
+    edges: Array,
+    gas: Array,
 ) -> Array:
     """d(state)/dt."""
-    return rates_and_levels(np.zeros(4), s, command, push, linkage, pistons, law, heat, valve, gas)
+    return rates_and_levels(np.zeros(4), s, command, push, linkage, pistons, law, heat, valve, edges, gas)
 
 
 @compiled
@@ -120,6 +147,7 @@ def rates_and_levels(
     law: Array,
     heat: Array,
     valve: Array,
+    edges: Array,
     gas: Array,
 ) -> Array:
     """d(state)/dt, with the speeds of both pistons and their levels G(v) in ``found`` (4,)."""
@@ -155,14 +183,15 @@ def rates_and_levels(
         for side in range(2):
             p, t, k = pressure[side], temperature[side], 2 * c + side
             spool = s[14 + k]
-            opened_in, opened_out = valve[2] + valve[0] * max(spool, 0.0), valve[2] + valve[0] * max(-spool, 0.0)
+            opened_in = valve[2] + valve[0] * opened(spool, edges[k, 0])
+            opened_out = valve[2] + valve[0] * opened(-spool, edges[k, 1])
             mass_rate, enthalpy_rate, cp = 0.0, 0.0, gamma * r / (gamma - 1)
-            for source, opened in ((supply, opened_in), (atmosphere, opened_out)):
+            for source, conductance in ((supply, opened_in), (atmosphere, opened_out)):
                 if source > p:
-                    q = orifice(opened, source, ambient, p, valve[1], rho, t_ref)
+                    q = orifice(conductance, source, ambient, p, valve[1], rho, t_ref)
                     mass_rate, enthalpy_rate = mass_rate + q, enthalpy_rate + q * cp * ambient
                 else:
-                    q = orifice(opened, p, t, source, valve[1], rho, t_ref)
+                    q = orifice(conductance, p, t, source, valve[1], rho, t_ref)
                     mass_rate, enthalpy_rate = mass_rate - q, enthalpy_rate - q * cp * t
             warming = heat[1] * wall[side] * (ambient - t) + heat[2] * (temperature[1 - side] - t)
             ds[4 + k] = mass_rate

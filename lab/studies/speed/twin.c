@@ -42,14 +42,22 @@ static inline double orifice_flow(double conductance, double p_from, double t_fr
     return p_from > p_to ? size : -size;
 }
 
+/* Part of a valve's conductance that one of its edges, whose three rows begin at `first` and lie 4 apart, opens after a stroke
+ * towards it: t (1 + c (1 - t)) with t = (stroke - d) / (1 - d), multiplied out in stroke - d. */
+static inline double opened(double stroke, const row *p, int first, int i) {
+    double beyond = fmax(stroke - p[first][i], 0.0);
+    return beyond * p[first + 4][i] - beyond * beyond * p[first + 8][i];
+}
+
 /* dP/dt and dT/dt of a chamber named by its state rows, in lane i; `length` is that of its air column, m. */
 static inline void chamber(const row *x, const row *p, row *dx, int i, int pressure_row, int temperature_row, int other_row,
                            int spool_row, int area_row, int perimeter_row, double length, double length_rate) {
     double pressure = x[pressure_row][i], temperature = x[temperature_row][i], spool = x[spool_row][i];
     double wall = p[TEMPERATURE][i], area = p[area_row][i], gas = p[GAS][i], gamma = p[GAMMA][i];
 
-    double supply = p[CONDUCTANCE][i] * fmax(spool, 0.0) + p[LEAKAGE][i];
-    double exhaust = p[CONDUCTANCE][i] * fmax(-spool, 0.0) + p[LEAKAGE][i];
+    int valve = spool_row - S1P;
+    double supply = p[CONDUCTANCE][i] * opened(spool, p, SUPPLY_OVERLAP_P1 + valve, i) + p[LEAKAGE][i];
+    double exhaust = p[CONDUCTANCE][i] * opened(-spool, p, EXHAUST_OVERLAP_P1 + valve, i) + p[LEAKAGE][i];
     double q_in = orifice_flow(supply, p[SUPPLY][i], wall, pressure, temperature, p[RHO0][i], p[T0][i], p[CRITICAL][i]);
     double q_out = orifice_flow(exhaust, pressure, temperature, p[ATMOSPHERE][i], wall, p[RHO0][i], p[T0][i], p[CRITICAL][i]);
 

@@ -1,0 +1,1 @@
+"""The plant's assumptions beside measured data."""
