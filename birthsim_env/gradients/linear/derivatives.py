@@ -23,7 +23,7 @@ from birthsim_env.physics.geometry import end_effector_motion
 KINKED = (at.V1, at.V2, *at.SPOOLS)
 """States that may stand on a kink: dry friction and orifices."""
 
-STILL = range(at.STATES + options.FLOWS, options.ALL)
+STILL = range(at.STATES + options.FLOWS, at.STATES + options.BRISTLES)
 """The same of ``physics.options``: air in tubes, which carries the heat of where it comes from."""
 
 BESIDE = 1e-300
