@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from birthsim_env.physics.characteristic import Edge, opened_part
+from birthsim_env.physics.characteristic import edge_of, opened_part
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import MPYE_5_M5, Curve
@@ -95,7 +95,7 @@ def fit_valve_table(path: Path) -> ValveTable:
     sides = {}
     for name, sign in (("supply", 1.0), ("exhaust", -1.0)):
         rows = sign * opening > 0.0
-        sides[name] = _fitted(sign * opening[rows], np.abs(flow[rows]), f"{table.source}, edge to the {name}")
+        sides[name] = fit_edge(sign * opening[rows], np.abs(flow[rows]), f"{table.source}, edge to the {name}")
     found = ValveTable(**sides)
     if not any(sides.values()):
         raise ValueError(
@@ -104,7 +104,14 @@ def fit_valve_table(path: Path) -> ValveTable:
     return found
 
 
-def _fitted(opening: Array, flow: Array, where: str) -> Side | None:
+def parts_of(opening: Array, overlap: float, curvature: float, share: float = 1.0) -> Array:
+    """Part of the valve's conductance that an edge opens at each ``opening``."""
+    edge = edge_of(overlap, curvature, share)
+    return np.array([opened_part(one, edge) for one in opening.tolist()])
+
+
+def fit_edge(opening: Array, flow: Array, where: str) -> Side | None:
+    """What fits the rows of one edge best; None without rows. Raises ``ValueError``, as ``fit_valve_table`` does."""
     if not len(opening):
         return None
     if len(opening) < LEAST or opening.max() < 0.9 or flow.max() <= 0.0:
@@ -114,14 +121,8 @@ def _fitted(opening: Array, flow: Array, where: str) -> Side | None:
         )
     most = float(flow.max())
 
-    def parts(numbers: Array) -> Array:
-        overlap, curvature, share = numbers
-        reach = 1.0 - overlap
-        edge = Edge(overlap, share * (1.0 + curvature) / reach, share * curvature / (reach * reach))
-        return np.array([opened_part(one, edge) for one in opening.tolist()])
-
     best = least_squares(
-        lambda numbers: parts(numbers) - flow / most, [*MPYE_5_M5, 1.0], bounds=([0.0, -0.8, 0.5], [0.5, 0.8, 2.0])
+        lambda numbers: parts_of(opening, *numbers) - flow / most, [*MPYE_5_M5, 1.0], bounds=([0.0, -0.8, 0.5], [0.5, 0.8, 2.0])
     )
     error = float(np.abs(best.fun).max())
     if error > FITS:

@@ -87,7 +87,7 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 def _cost(rows: list[dict[str, Any]], sensors: str, crossing: float) -> float:
-    """By how much, in parts, a ``crossing`` errs more than valves without overlap, on the worlds that judge it."""
+    """By which part a ``crossing`` has a larger settled error than valves without overlap, on the worlds that judge."""
     settled = {row["crossing"]: row["settled"][0] for row in rows if (row["sensors"], row["worlds"]) == (sensors, "judged")}
     return float(settled[crossing] / settled[None] - 1.0)
 
@@ -111,7 +111,7 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
             panel.set_ylim(bottom=0.0)
         axes[0, 0].set_ylabel("turns of a valve (1/s)")
         cost = 100 * _cost(rows, kinds[0], own)
-        words = f"With {kinds[0]} sensors crossing over {100 * own:g} % of full flow (o) errs {cost:.2g} % more"
+        words = f"With {kinds[0]} sensors a crossing of {100 * own:g} % of full flow (o) errs by {cost:.2g} % more"
         headline(figure, f"{words} than without overlap (x)")
         legend_below(figure)
         return save(figure, folder, "valve_crossing")

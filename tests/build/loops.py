@@ -19,6 +19,7 @@ OPTIONS = Parameters().replace(
         "air.supply_conductance": 1e-8,
         "mechanics.mode_frequency": 20.0,
         "chambers.tube_length": 1.0,
+        "friction.law": "gms",
         "valves.hysteresis": 0.02,
         "electronics.acceleration_bandwidth": 50.0,
     }

@@ -132,6 +132,7 @@ OPTIONS = {
     "all": {
         "air.supply_conductance": 6e-9, "air.supply_volume": 2e-3, "chambers.tube_length": 1, "mechanics.mode_frequency": 30,
     },
+    "seals": {"friction.law": "gms", "cylinder1.pressure_friction": 5e-6, "cylinder2.direction_asymmetry": 0.2},
 }  # fmt: skip
 
 

@@ -137,9 +137,9 @@ def test_options_of_a_rig_have_their_states() -> None:
     ways = np.concatenate([np.diag(step), -np.diag(step)], axis=1)
     plant = Plant(rig, ways.shape[1])
     plant.state = model.at.state[:18, None] + ways[:18]
-    plant.memory[4:] = model.at.state[18:, None] + ways[18:31]
+    plant.memory[4:17] = model.at.state[18:31, None] + ways[18:31]
     plant.advance(ways[31:35], hand[:, None] + ways[35:], duration)
-    reached = np.concatenate([plant.state, plant.memory[4:]])
+    reached = np.concatenate([plant.state, plant.memory[4:17]])
     found = (reached[:, :37] - reached[:, 37:]) / (2 * step)
     whole = np.zeros((37, 37))
     whole[:31] = np.hstack([model.A, model.B])

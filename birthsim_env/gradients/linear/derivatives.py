@@ -23,7 +23,7 @@ from birthsim_env.physics.geometry import end_effector_motion
 KINKED = (at.V1, at.V2, *at.SPOOLS)
 """States that may stand on a kink: dry friction and orifices."""
 
-STILL = range(at.STATES + options.FLOWS, options.ALL)
+STILL = range(at.STATES + options.FLOWS, at.STATES + options.BRISTLES)
 """The same of ``physics.options``: air in tubes, which carries the heat of where it comes from."""
 
 BESIDE = 1e-300
@@ -39,7 +39,8 @@ def _traced(has_options: bool) -> tuple[Graph, list[Scalar]]:
     if has_options:
         own, tube = empty(at.PARAMETERS), empty(tubes.CONSTANTS)
         call(options.alter, p, own, tube, 1)
-        call(options.right_hand_side, x, u, f, own, tube, empty(4), empty(2), rates, 1)
+        rates[at.STATES + options.BRISTLES :] = 0.0
+        call(options.right_hand_side, x, u, f, own, tube, empty(4), empty(2), empty(2), rates, 1)
         call(options.port_motion, x[: at.STATES], x[at.STATES :], p, motion)
     else:
         call(dynamics.right_hand_side, x, u, f, p, rates, 1)

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from birthsim_env.physics import valves
+from birthsim_env.physics.characteristic import edge_of
 from birthsim_env.physics.rig.declaration import Derived, Prior, Section, derived, parameter
 
 
@@ -282,8 +283,7 @@ def _edge_number(side: str, valve: str, number: int, rig: Any) -> Any:
     share = 1.0 + getattr(own, f"{side}_conductance")
     if side == "exhaust":
         share = share * shared.exhaust_ratio
-    reach = 1.0 - overlap
-    return (overlap, share * (1.0 + curvature) / reach, share * curvature / (reach * reach))[number]
+    return edge_of(overlap, curvature, share)[number]
 
 
 def edge_rows() -> Iterator[tuple[str, Derived]]:

@@ -148,7 +148,7 @@ def test_a_plant_with_reservoir_tubes_and_handle_moves_as_the_second_model_with_
             np.testing.assert_allclose(
                 plant.memory[4 + options.TUBES : 4 + options.FLOWS, 0], model.at_ends(model.ends), rtol=4e-3
             )
-            np.testing.assert_allclose(plant.memory[4 + options.FLOWS :, 0], model.ends[4:], atol=3e-5)
+            np.testing.assert_allclose(plant.memory[4 + options.FLOWS : 4 + options.BRISTLES, 0], model.ends[4:], atol=3e-5)
         if "air.supply_conductance" in changes:
             supply = plant.lane_parameters[at.SUPPLY, 0]
             assert supply == pytest.approx(model.pressure(model.reservoir), rel=1e-4)
