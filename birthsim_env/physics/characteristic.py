@@ -14,20 +14,23 @@ three rows an edge. A measured table is fitted (``baselines.identification.valve
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from birthsim_env.physics.compiled.compilation import helper
 
 
 class Edge(NamedTuple):
-    """A metering edge, of which tau (``slope`` - ``bend`` tau) is open, in parts of the valve's conductance.
-
-    With the edge's own share e of it, ``slope`` is e (1 + c)/(1 - d), and ``bend`` is e c/(1 - d)^2; ``overlap`` is d.
-    """
+    """A metering edge, of which tau (``slope`` - ``bend`` tau) is open, in parts of the valve's conductance (``edge_of``)."""
 
     overlap: float
     slope: float
     bend: float
+
+
+def edge_of(overlap: Any, curvature: Any, share: Any) -> Edge:
+    """The edge with overlap d, curvature c and its own ``share`` of the valve's conductance; of arrays, edges side by side."""
+    reach = 1.0 - overlap
+    return Edge(overlap, share * (1.0 + curvature) / reach, share * curvature / (reach * reach))
 
 
 @helper

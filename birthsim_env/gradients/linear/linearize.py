@@ -10,7 +10,8 @@ leave over, so that the point is a balance of forces.
   states. The falling part of Stribeck's curve, below about ``stribeck_speed``, is left out.
 
 Shut spools lie on a kink: opening fills a chamber from the supply, closing empties it to the atmosphere. The gain there is the
-mean of both (``derivatives``). An opening on one side of zero, however small, gives the gain of that side.
+mean of both (``derivatives``). An opening on one side of zero, however small, gives the gain of that side. Within an overlap
+there is none.
 """
 
 from pathlib import Path

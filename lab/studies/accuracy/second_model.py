@@ -60,7 +60,7 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
         to_exhaust = v.exhaust_overlap + own.exhaust_overlap, v.exhaust_curvature + own.exhaust_curvature
         edges[k, 0] = *to_supply, 1 + own.supply_conductance
         edges[k, 1] = *to_exhaust, v.exhaust_ratio * (1 + own.exhaust_conductance)
-    edges[:, :, 0] = edges[:, :, 0].clip(0)
+    edges[:, :, 0], edges[:, :, 1] = edges[:, :, 0].clip(0), edges[:, :, 1].clip(-0.95, 0.95)
     around = air.supply_pressure, air.atmospheric_pressure, air.temperature
     reference = air.reference_density, air.reference_temperature
     gas = np.array([*around, air.gas_constant, air.heat_capacity_ratio, *reference])
