@@ -139,7 +139,7 @@ def _entered(entry: str, module: str) -> frozenset[Place]:
 @cache
 def _registering() -> frozenset[Place]:
     """The definitions that register ids of environments, and those that call them."""
-    files = [path for package in sources.PACKAGES[:-1] for path in (sources.ROOT / package).rglob("*.py")]
+    files = sources.files_of(*sources.PACKAGES[:-1])
     found, words = set[Place](), {b"gymnasium"}
     while words:
         naming = [path for path in files if any(word in path.read_bytes() for word in words)]

@@ -69,9 +69,8 @@ def _content(path: Path) -> bytes:
 @cache
 def take_stock() -> None:
     """Hold the content of all files, so that what is edited while work goes on is not taken for what worked."""
-    for package in sources.PACKAGES:
-        for path in (sources.ROOT / package).rglob("*.py"):
-            _content(path)
+    for path in sources.files_of(*sources.PACKAGES):
+        _content(path)
 
 
 def _read(content: bytes) -> Definitions:

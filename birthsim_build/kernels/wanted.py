@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, get_type_hints
 from birthsim_env.gradients.source import module_of
 from birthsim_env.loop.stage import layouts_of
 from birthsim_env.physics.compiled.compilation import Kernel
-from birthsim_env.physics.compiled.sources import ROOT
+from birthsim_env.physics.compiled.sources import ROOT, files_of
 
 PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_live")
 """Whose kernels run in blocks of lanes; those of ``birthsim_build`` run in what it builds."""
@@ -43,17 +43,16 @@ def asked(keys: list[str], texts: list[str]) -> list[Wanted]:
 
 
 def _kernels() -> Iterator[Kernel]:
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            # Modules that have none may need what is not installed.
-            if "\n@kernel\n" in path.read_text(encoding="utf-8"):
-                name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-                module = import_module(name.removesuffix(".__init__"))
-                yield from (
-                    one
-                    for one in vars(module).values()
-                    if isinstance(one, Kernel) and not one.inlined and one.__module__ == module.__name__
-                )
+    for path in files_of(*PACKAGES):
+        # Modules that have none may need what is not installed.
+        if "\n@kernel\n" in path.read_text(encoding="utf-8"):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            module = import_module(name.removesuffix(".__init__"))
+            yield from (
+                one
+                for one in vars(module).values()
+                if isinstance(one, Kernel) and not one.inlined and one.__module__ == module.__name__
+            )
 
 
 def _is_of_numbers(kernel: Any) -> bool:

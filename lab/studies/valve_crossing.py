@@ -23,7 +23,7 @@ from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
-from lab.engine.worlds import SEED
+from lab.engine.worlds import SEED, worlds
 
 CHOSEN = 920_000
 """First seed of the worlds on which the crossing was chosen."""
@@ -83,7 +83,9 @@ def _shown(content: Content) -> dict[str, str]:
     for row in content["figures"]:
         cells = [" / ".join(map(number, row[name])) for name in COLUMNS]
         rows.append([f"`{row['controller']}`", row["sensors"], row["worlds"], _crossing(row["crossing"]), *cells])
-    return {"valve-crossing.md": markdown(rows) + "\n"}
+    count = content["settings"]["episodes"]
+    said = f"Chosen: {worlds(CHOSEN, count)}. Judged: {worlds(content['settings']['seed'], count)}."
+    return {"valve-crossing.md": f"{said}\n\n{markdown(rows)}\n"}
 
 
 def _cost(rows: list[dict[str, Any]], sensors: str, crossing: float) -> float:
@@ -132,4 +134,4 @@ STUDY = Study(
     draw=_drawn,
     words={"seed": "first seed of the worlds that judge it"},
 )
-register(study="valve-crossing", about="over what part of full flow controllers cross the overlap of their valves")(STUDY)
+register(study="valve-crossing", about="how controllers cross the overlap of valves")(STUDY)

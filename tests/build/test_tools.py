@@ -7,6 +7,7 @@ import pytest
 
 from birthsim_build.code import tools
 from birthsim_build.code.tools import run_tool, tool_environment
+from birthsim_env.physics.compiled.sources import files_of
 from tests.build.targets import need_linker
 
 SAID = "import os; print(os.environ['HOME'], os.environ['XDG_CACHE_HOME'])"
@@ -58,6 +59,6 @@ def test_zig_compiles_without_a_home(homeless, tmp_path):
 def test_only_this_place_runs_programs_of_others():
     """Of the packages: what else runs is Python itself, which compiles."""
     packages = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents")
-    files = [path for package in packages for path in (Path(tools.__file__).parents[2] / package).rglob("*.py")]
+    files = files_of(*packages)
     runs = {f"{path.parent.name}/{path.name}" for path in files if "import subprocess" in path.read_text(encoding="utf-8")}
     assert runs == {"code/tools.py", "code/compiler.py", "kernels/__main__.py", "kernels/recording.py"}

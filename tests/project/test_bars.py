@@ -2,14 +2,14 @@
 
 import ast
 
-from tests.console import ROOT
+from birthsim_env.physics.compiled.sources import files_of
 
 PACKAGES = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents", "lab", "examples")
 
 
 def bars():
     """(file, expression of the unit or None) of every bar."""
-    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+    for path in files_of(*PACKAGES):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tqdm":
                 yield path.name, next((word.value for word in node.keywords if word.arg == "unit"), None)

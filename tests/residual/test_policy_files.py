@@ -12,6 +12,7 @@ from safetensors import safe_open
 from safetensors.numpy import load
 
 from agents.policy.files import FORMAT, WEIGHTS, read_policy, save_policy
+from birthsim_env.physics.compiled.sources import files_of
 from tests.console import ROOT
 from tests.residual.policies import ENVIRONMENT, POLICIES, network, policy
 
@@ -56,7 +57,7 @@ def test_the_same_policy_is_the_same_bytes_in_another_process(folder):
 
 def test_no_module_of_the_project_unpickles():
     forbidden = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
-    files = {file for package in ("birthsim_env", "baselines", "agents") for file in (ROOT / package).rglob("*.py")}
+    files = set(files_of("birthsim_env", "baselines", "agents"))
     # The kernels' own cache holds machine code, which runs anyway, and a script's kernel goes to other processes by value;
     # joblib starts processes there and reads no file.
     compiled = {ROOT / f"birthsim_env/physics/compiled/{name}.py" for name in ("compilation", "with_numba")}

@@ -11,6 +11,7 @@ import pytest
 from baselines.identification.experiment import NAMES
 from baselines.logs.table import read_table
 from birthsim_env.parts.own_parts import COURSE, FORCE
+from birthsim_env.physics.compiled.sources import files_of
 from birthsim_env.tables.columns import columns, table_file
 from birthsim_env.tables.table import Reading
 from tests.console import ROOT
@@ -251,8 +252,7 @@ READERS = {"reader", "DictReader", "loadtxt", "genfromtxt", "fromstring", "fromt
 def test_nothing_else_reads_tables() -> None:
     found = {
         (path.relative_to(ROOT).as_posix(), node.attr if isinstance(node, ast.Attribute) else node.id)
-        for package in PACKAGES
-        for path in (ROOT / package).rglob("*.py")
+        for path in files_of(*PACKAGES)
         if "tables" not in path.parts
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if (isinstance(node, ast.Attribute) and node.attr in READERS) or (isinstance(node, ast.Name) and node.id in READERS)

@@ -98,6 +98,18 @@ def dependencies(paths: Iterable[Path], aside: frozenset[Path] = frozenset()) ->
     return sorted(seen)
 
 
+def files_of(*packages: str) -> list[Path]:
+    """The Python files of packages of this project, sorted.
+
+    What is kept beside them in ``__pycache__`` comes and goes meanwhile, so that nobody looks in there."""
+    found = list[Path]()
+    for package in packages:
+        for folder, below, files in os.walk(ROOT / package):
+            below[:] = [name for name in below if name != "__pycache__"]
+            found += [Path(folder, name) for name in files if name.endswith(".py")]
+    return sorted(found)
+
+
 @cache
 def source_stamp(path: Path) -> str:
     """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not.

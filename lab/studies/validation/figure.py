@@ -62,7 +62,7 @@ def _tubes(found: dict[str, Any], folder: Path) -> list[Path]:
         for k, (words, fitted) in enumerate((("fitted", True), ("foretold", False))):
             chosen = {int(length): value for length, value in found["by_length"].items() if (int(length) in FITTED) == fitted}
             axes.bar(list(chosen), list(chosen.values()), color=look(k)["color"], width=0.6, label=words)
-        axes.set(xlabel="length of the tube (m)", ylabel="error (bar RMS)", xticks=[int(one) for one in found["by_length"]])
+        axes.set(xlabel="length of the tube (m)", ylabel="RMS error (bar)", xticks=[int(one) for one in found["by_length"]])
         headline(
             figure, f"Pressures at both ends of tubes that were not fitted are foretold within {found['foretold']:.2f} bar RMS"
         )

@@ -78,4 +78,4 @@ STUDY = Study(
     words={"data": "folder with the measured data, as docs/validation.md says"},
     places=("data",),
 )
-register(study="validation", about="what the plant assumes, beside measured seals, valves and tubes")(STUDY)
+register(study="validation", about="assumptions beside measured seals, valves, tubes")(STUDY)

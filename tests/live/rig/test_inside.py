@@ -20,7 +20,7 @@ def moving_plant(law):
 
 def inside(plant):
     rows = np.empty((INSIDE, 1))
-    look_inside(plant.state, plant.lane_parameters, rows)
+    look_inside(plant.state, plant.lane_parameters, np.zeros((4, plant.num_envs)), rows)
     return rows[:, 0]
 
 

@@ -157,7 +157,7 @@ def test_one_hand_pulls_both_and_both_stand_still_where_one_is_lost(page):
 
 def test_a_row_holds_friction_and_flows(page):
     told, rows = one(page, held(0.56, 0.02), ("advance", 300))[-1], np.empty((INSIDE, 1))
-    look_inside(told.rows[-1, ROW["y1"] : ROW["y1"] + 18, None].copy(), parameter_array(RIG, 1), rows)
+    look_inside(told.rows[-1, ROW["y1"] : ROW["y1"] + 18, None].copy(), parameter_array(RIG, 1), np.zeros((4, 1)), rows)
     assert np.array_equal(told.of("friction"), rows[:2, 0])
     assert np.array_equal(told.of("flows"), rows[2:, 0])
 

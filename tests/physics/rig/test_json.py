@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from birthsim_env.physics.compiled.sources import files_of
 from birthsim_env.physics.rig.json_reading import DEEPEST, DIGITS, parse_json, read_json
 from birthsim_env.physics.rig.schema import Each, Listed, fault
 from tests.console import ROOT
@@ -107,6 +108,6 @@ OWN = {
 
 def test_nothing_else_in_the_packages_parses_json():
     packages = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live")
-    files = [path for package in packages for path in (ROOT / package).rglob("*.py")]
+    files = files_of(*packages)
     found = {path.relative_to(ROOT).as_posix() for path in files if re.search(r"\bjson\.loads?\(", path.read_text("utf-8"))}
     assert found == {*OWN, "birthsim_env/physics/rig/json_reading.py"}
