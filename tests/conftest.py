@@ -141,14 +141,20 @@ def pytest_itemcollected(item):
         item.add_marker("fuzz")
 
 
+TOGETHER = {
+    "browser": ("tests/live/page/", "tests/project/test_docs.py"),
+    "device": ("tests/build/test_beginning.py", "tests/build/test_device.py"),
+}
+"""Modules that one worker runs one after the other, because they share what takes long to make."""
+
 LONG = 25.0
 """What a test that is marked slow takes, in times of one that is not, assumed."""
 
 
 def _scope(nodeid):
-    """What one worker runs: its module, or all tests in a browser."""
+    """What one worker runs: its module, all tests in a browser, or all on a device, whose code is compiled once."""
     path = nodeid.partition("::")[0]
-    return "browser" if path.startswith(("tests/live/page/", "tests/project/test_docs.py")) else path
+    return next((name for name, places in TOGETHER.items() if path.startswith(places)), path)
 
 
 @pytest.hookimpl(trylast=True)
