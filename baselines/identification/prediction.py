@@ -23,8 +23,8 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
     """Pressures (V, W, K, 4), Pa, positions (V, W, F, 2), m, and states at the end (18, V, W), for V ``rigs``.
 
     ``states`` (18, V, W) are those in which the windows begin; their spools are replaced by what the openings before the
-    window have made of them. A position that arrives at a time was taken ``position_latency`` earlier. Deadband and limit of
-    the valves are those of the first rig.
+    window have made of them. A position that arrives at a time was taken ``position_latency`` earlier. The limit of the
+    valves is that of the first rig.
     """
     count, trial = len(windows.starts), windows.trial
     windows.budget.spend(count * len(rigs) * windows.length * trial.period)

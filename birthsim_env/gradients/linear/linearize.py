@@ -138,8 +138,9 @@ def linearize(
 
     Notes
     -----
-    Deadband and hysteresis of the valves are left out, and so are states of options that a rig has not. A handle on a
-    structure that bends is where it carries the hand's force. docs/linear.md compares the model with the plant.
+    Hysteresis of the valves is left out, and so are states of options that a rig has not. A valve that stands within its
+    overlap has no gain. A handle on a structure that bends is where it carries the hand's force. docs/linear.md compares the
+    model with the plant.
 
     Examples
     --------
