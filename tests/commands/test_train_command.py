@@ -97,12 +97,16 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_during_training_keeps_the_best_policies_and_the_checkpoints(jobs, tmp_path, small):
-    """The first checkpoint follows the first validation, before anything is learned."""
+    """The first checkpoint follows the first validation, before anything is learned, and the first policy follows that.
+
+    A worker that is ended between them leaves its policy in the checkpoint, where the next training finds it.
+    """
     folders = [tmp_path / f"seed_{seed}" for seed in range(jobs)]
     arguments = ("--config", small, "--steps", 10**8, "--seeds", jobs, "--jobs", jobs, "--out", tmp_path)
-    status, printed = interrupted("train", arguments, lambda: all((folder / CHECKPOINT).is_file() for folder in folders))
+    status, printed = interrupted("train", arguments, lambda: all((folder / WEIGHTS).is_file() for folder in folders))
     assert status == 130
     assert jobs == 2 or "interrupted after" in printed
     assert jobs == 2 or f"policy and checkpoint are kept in {tmp_path}/seed_0/" in printed
     for folder in folders:
+        assert (folder / CHECKPOINT).is_file()
         assert read_policy(folder).environment == RESIDUAL
