@@ -1,6 +1,7 @@
 # make quick  lints, and runs the contracts and the stored trajectories: half a minute, between two edits
 # make run    installs, reproduces Fig. 4, trains a residual policy and, by gradients, a controller from scratch, and evaluates them
-# make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
+# make test   installs and runs the tests; make test-slow runs those marked slow, make test-all both at once
+# make portable runs tests of bits as other processors would, make oldest with the oldest Numba
 # make fuzz tries odd input on everything that is read or called, and make kills disturbs every command at random moments (hours)
 # make mutation changes physics and controllers to see whether a test fails (hours); make soak runs 10^8 policy steps (half an hour)
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
@@ -19,13 +20,15 @@
 VENV := .venv
 BIN := $(VENV)/bin
 BASE := $(VENV)/.base
+TORCH := $(VENV)/.torch
 AGENTS := $(VENV)/.agents
+PROJECT := $(VENV)/.project
 READY := $(VENV)/.ready
 OUT := out
 TOOLS := $(OUT)/tools
 NPM := $(OUT)/npm
 MUTMUT := $(OUT)/mutmut
-OLDEST := numba==0.65.0 llvmlite==0.47.0
+OLDEST := $(OUT)/oldest
 PYTEST := $(BIN)/python -m pytest -n 2 --durations 20 --durations-min 1
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
@@ -54,7 +57,7 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-.PHONY: run figure test test-slow quick test-weekly portable oldest fuzz mutation soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page kernels docs docs-links devcontainer golden clean
+.PHONY: run figure test test-slow test-all quick test-weekly portable oldest fuzz mutation soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page kernels docs docs-links devcontainer golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml packaging/requirements/base.txt
@@ -63,18 +66,24 @@ $(BASE): pyproject.toml packaging/requirements/base.txt
 	$(PIP) install --quiet --no-deps --no-build-isolation --no-compile --editable .
 	touch $@
 
-# What a training needs. PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this
-# Python, PyPI's with CUDA.
-$(AGENTS): $(BASE) packaging/requirements/torch.txt packaging/requirements/agents.txt
+# PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
+$(TORCH): $(BASE) packaging/requirements/torch.txt
 	$(PIP) $(LOCKED)/torch.txt 2>/dev/null || $(PIP) $(TORCH_CPU) $(LOCKED)/torch.txt \
 	  || { echo "No CPU build of PyTorch within reach: PyPI's comes with CUDA, 2.2 GB more"; $(PIP) $(LOCKED)/torch-cuda.txt; }
+	touch $@
+
+# What a training needs besides.
+$(AGENTS): $(TORCH) packaging/requirements/agents.txt
 	$(PIP) $(LOCKED)/agents.txt
 	touch $@
 
-# What tests and documentation need besides.
-$(READY): $(AGENTS) packaging/requirements/project.txt
+# What tests and documentation need, trainings among them: no file of it is PyTorch's, which --jobs 2 installs meanwhile.
+$(PROJECT): $(BASE) packaging/requirements/project.txt
 	$(PIP) $(LOCKED)/project.txt
 	touch $@
+
+$(READY): $(TORCH) $(PROJECT)
+	touch $(AGENTS) $@
 
 $(TOOLS)/.ready: packaging/requirements/tools.txt
 	test -x $(TOOLS)/bin/python || python3 -m venv $(TOOLS)
@@ -111,6 +120,12 @@ test-slow: $(READY)
 	$(PYTEST) -m slow
 	HYPOTHESIS_PROFILE=slow $(PYTEST) -m "not slow" tests/fuzz
 
+# Both, with what they share made once, and every example of tests/fuzz tried once.
+test-all: $(READY)
+	$(BIN)/python -m tests.warming
+	$(PYTEST) -m "slow or not fuzz"
+	HYPOTHESIS_PROFILE=slow $(PYTEST) -m "not slow" tests/fuzz
+
 # Between two edits: what changed, the order of the packages, and the stored trajectories.
 quick: $(READY)
 	$(BIN)/ruff check --quiet .
@@ -126,9 +141,11 @@ portable: $(READY)
 	$(BIN)/python -m lab.studies.processors
 
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
-oldest: $(READY)
-	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	BIRTHSIM_PREBUILT=0 PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m lab.studies.processors here
+oldest: $(READY) $(OLDEST)/numba
+	BIRTHSIM_PREBUILT=0 PYTHONPATH=$(CURDIR)/$(OLDEST) NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/cache $(BIN)/python -m lab.studies.processors here
+
+$(OLDEST)/numba: | $(BASE)
+	$(PIP) install --quiet --no-deps --target $(OLDEST) numba==0.65.0 llvmlite==0.47.0
 
 # A full disk needs root.
 kills: $(READY)

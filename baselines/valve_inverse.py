@@ -3,6 +3,8 @@
 from typing import NamedTuple
 
 from birthsim_env.physics import control_model, valves
+from birthsim_env.physics.characteristic import Edge, largest_part, opened_part
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 
@@ -25,9 +27,20 @@ def driving_flows(pressure: float, p: Rig) -> tuple[float, float]:
     )
 
 
-class CylinderAir(NamedTuple):
-    """Pressures (Pa), areas (m2) and lengths (m) of a cylinder's chambers at an instant, and the speed of its piston (m/s)."""
+@helper
+def valve_of(chamber: int, p: Rig) -> valves.Valve:
+    """The valve of ``chamber``, 0 to 3 of P1, N1, P2, N2, as believed."""
+    r = p.rows
+    supply = Edge(r[at.SUPPLY_OVERLAP_P1 + chamber], r[at.SUPPLY_SLOPE_P1 + chamber], r[at.SUPPLY_BEND_P1 + chamber])
+    exhaust = Edge(r[at.EXHAUST_OVERLAP_P1 + chamber], r[at.EXHAUST_SLOPE_P1 + chamber], r[at.EXHAUST_BEND_P1 + chamber])
+    return valves.Valve(supply, exhaust, p.conductance, p.leakage, p.crossing)
 
+
+class CylinderAir(NamedTuple):
+    """Pressures (Pa), areas (m2) and lengths (m) of the chambers of cylinder ``number``, 0 or 1, at an instant, and the speed
+    of its piston (m/s)."""
+
+    number: int
     pp: float
     pn: float
     ap: float
@@ -42,7 +55,7 @@ def air_at(k: int, pp: float, pn: float, y: float, v: float, p: Rig) -> Cylinder
     """Cylinder ``k``, 0 or 1, of a rig with its piston at ``y``, m."""
     ap, an = (p.area_p1, p.area_n1) if k == 0 else (p.area_p2, p.area_n2)
     half = p.half_l1 if k == 0 else p.half_l2
-    return CylinderAir(pp, pn, ap, an, max(half + y, CLEARANCE), max(half - y, CLEARANCE), v)
+    return CylinderAir(k, pp, pn, ap, an, max(half + y, CLEARANCE), max(half - y, CLEARANCE), v)
 
 
 @helper
@@ -73,8 +86,8 @@ def two_valve_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Ri
     flow_n = control_model.chamber_flow_n(active, pressurization, c.length_p, c.length_n)
     fill_p, drain_p = driving_flows(c.pp, p)
     fill_n, drain_n = driving_flows(c.pn, p)
-    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p.conductance, p.leakage)
-    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, p.conductance, p.leakage)
+    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, valve_of(2 * c.number, p))
+    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, valve_of(2 * c.number + 1, p))
 
 
 @helper
@@ -95,8 +108,8 @@ def one_valve_openings(rate: float, c: CylinderAir, p: Rig) -> tuple[float, floa
         drain_n,
         0.5 * stroke / c.length_p,
         0.5 * stroke / c.length_n,
-        p.conductance,
-        p.leakage,
+        valve_of(2 * c.number, p),
+        valve_of(2 * c.number + 1, p),
     )
     return opened, -opened
 
@@ -111,19 +124,21 @@ def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: 
     active, pressurization = _flows_for(rate, stiffness_rate, c, p)
     fill_p, drain_p = driving_flows(c.pp, p)
     fill_n, drain_n = driving_flows(c.pn, p)
-    full, leak = p.conductance, p.leakage
+    full, leak, valve_p, valve_n = p.conductance, p.leakage, valve_of(2 * c.number, p), valve_of(2 * c.number + 1, p)
     to_p, to_n = (c.length_p + c.length_n) / c.length_p, (c.length_p + c.length_n) / c.length_n
     # Bounds of qT + qA and of qT - qA from what each chamber can get; a valve without driving pressure stays shut.
     shut_p, shut_n = leak * (fill_p - drain_p), leak * (fill_n - drain_n)
-    most_p, least_p = to_p * (shut_p + full * max(fill_p, 0.0)), to_p * (shut_p - full * max(drain_p, 0.0))
-    most_n, least_n = to_n * (shut_n + full * max(fill_n, 0.0)), to_n * (shut_n - full * max(drain_n, 0.0))
+    most_p = to_p * (shut_p + full * largest_part(valve_p.supply) * max(fill_p, 0.0))
+    least_p = to_p * (shut_p - full * largest_part(valve_p.exhaust) * max(drain_p, 0.0))
+    most_n = to_n * (shut_n + full * largest_part(valve_n.supply) * max(fill_n, 0.0))
+    least_n = to_n * (shut_n - full * largest_part(valve_n.exhaust) * max(drain_n, 0.0))
     low, high = max(least_p - active, least_n + active), min(most_p - active, most_n + active)
     middle = 0.5 * (low + high)
     pressurization = max(low, min(high, pressurization)) if low < high else middle
     flow_p = control_model.chamber_flow_p(active, pressurization, c.length_p, c.length_n)
     flow_n = control_model.chamber_flow_n(active, pressurization, c.length_p, c.length_n)
-    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, full, leak)
-    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, full, leak)
+    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, valve_p)
+    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, valve_n)
 
 
 @helper
@@ -138,17 +153,20 @@ def flow_ranges(pressures: Array, spools: Array, p: Rig, least: Array, most: Arr
     kg/s; ``pressures``, Pa, and ``spools`` in [-1, 1]; all (4, N)."""
     c, leak = p.conductance, p.leakage
     for chamber in range(4):
+        supply, exhaust, _, _, _ = valve_of(chamber, p)
         for i in range(pressures.shape[1]):
             fill, drain = driving_flows(pressures[chamber, i], p)
             shut, spool = leak * (fill - drain), spools[chamber, i]
-            least[chamber, i], most[chamber, i] = shut - c * max(drain, 0.0), shut + c * max(fill, 0.0)
-            present[chamber, i] = shut + c * (max(spool, 0.0) * fill - max(-spool, 0.0) * drain)
+            least[chamber, i] = shut - c * largest_part(exhaust) * max(drain, 0.0)
+            most[chamber, i] = shut + c * largest_part(supply) * max(fill, 0.0)
+            present[chamber, i] = shut + c * (opened_part(spool, supply) * fill - opened_part(-spool, exhaust) * drain)
 
 
 @helper
 def openings_for_flows(flows: Array, pressures: Array, p: Rig, openings: Array) -> None:
     """Writes openings in [-1, 1] at which chambers P1, N1, P2, N2 get ``flows``, kg/s, or come near; (4, N) each."""
     for chamber in range(4):
+        valve = valve_of(chamber, p)
         for i in range(pressures.shape[1]):
             fill, drain = driving_flows(pressures[chamber, i], p)
-            openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, p.conductance, p.leakage)
+            openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, valve)

@@ -80,7 +80,7 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
         )
         info.supply_flow[i] = 0.0
         for k in range(4):
-            inflow, _ = air.flows_of(state, p, i, at.PRESSURES[k], at.TEMPERATURES[k], at.SPOOLS[k])
+            inflow, _ = air.flows_of(state, p, i, k)
             info.supply_flow[i] += max(inflow, 0.0)
     _describe_costs(world, info, n)
 

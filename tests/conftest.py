@@ -33,7 +33,7 @@ HypothesisProvider._local_constants = Constants()
 # The same examples every time, and as long as a busy machine needs; make test-slow tries more, make fuzz others, mutants few.
 settings.register_profile("quick", deadline=None, derandomize=True, database=None)
 settings.register_profile("deep", settings.get_profile("quick"), derandomize=False, max_examples=50_000)
-settings.register_profile("slow", settings.get_profile("quick"), max_examples=4000)
+settings.register_profile("slow", settings.get_profile("quick"), max_examples=2000)
 settings.register_profile("brief", settings.get_profile("quick"), max_examples=5)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 MUTANTS = os.environ.get("HYPOTHESIS_PROFILE") == "brief"
@@ -136,6 +136,31 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.write_line(f"s by folder: {', '.join(each)}; all {sum(folders.values()):.0f}")
 
 
+def pytest_itemcollected(item):
+    if item.nodeid.startswith("tests/fuzz/"):
+        item.add_marker("fuzz")
+
+
+LONG = 25.0
+"""What a test that is marked slow takes, in times of one that is not, assumed."""
+
+
+def _scope(nodeid):
+    """What one worker runs: its module, or all tests in a browser."""
+    path = nodeid.partition("::")[0]
+    return "browser" if path.startswith(("tests/live/page/", "tests/project/test_docs.py")) else path
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    """Of several workers none shall wait at the end for another's long module: the longest come first."""
+    if hasattr(config, "workerinput"):
+        takes = Counter()
+        for item in items:
+            takes[_scope(item.nodeid)] += LONG if item.get_closest_marker("slow") else 1.0
+        items.sort(key=lambda item: -takes[_scope(item.nodeid)])
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """One worker has the browser, and each module one worker: what its tests share is made once."""
@@ -143,11 +168,12 @@ def pytest_xdist_make_scheduler(config, log):
 
     class Grouped(LoadScopeScheduling):
         def _split_scope(self, nodeid):
-            path = nodeid.partition("::")[0]
-            shown = ("tests/live/page/", "tests/project/test_docs.py")
-            return "browser" if path.startswith(shown) else path
+            return _scope(nodeid)
 
-    return Grouped(config, log) if config.getvalue("dist") == "load" else None
+    if config.getvalue("dist") != "load":
+        return None
+    config.option.loadscopereorder = False  # as collected
+    return Grouped(config, log)
 
 
 def pytest_unconfigure(config):

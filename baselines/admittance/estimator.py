@@ -66,7 +66,8 @@ def predict(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimator
     """Valves and chambers, and the friction that is there along the motion."""
     p, period = constants.model.rig, constants.model.period
     chamber_observer.observe(memory.chambers, seen.pressure, memory.joints, p, period, constants.trust, memory.fresh)
-    reference_friction.update_bristle(estimate.motion, p, period, memory.bristle, estimate.drag)
+    pressures = memory.chambers.pressure
+    reference_friction.update_bristle(estimate.motion, pressures, p, period, memory.bristle, estimate.drag)
     for i in range(memory.fresh.shape[0]):
         for k in range(2):
             level = constants.friction_fraction * memory.friction.level[k, i]
@@ -111,12 +112,12 @@ def correct(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimator
 @helper
 def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
     """The level of friction and, without a force sensor, the hand's force, for the next period."""
-    fresh, assumed, joints = memory.fresh, constants.model, memory.joints
+    fresh, assumed, joints, pressures = memory.fresh, constants.model, memory.joints, memory.chambers.pressure
+    noise, hand, contact = estimate.inputs.noise, memory.hand, memory.contact
     if constants.friction_rate > 0.0:
         friction_level.learn(
-            memory.friction, estimate.drag, joints, estimate.unexplained, constants.friction_rate, assumed, fresh
+            memory.friction, estimate.drag, joints, pressures, estimate.unexplained, constants.friction_rate, assumed, fresh
         )
-    pressures, noise, hand, contact = memory.chambers.pressure, estimate.inputs.noise, memory.hand, memory.contact
     if constants.weighed > 0.0:
         place = int(constants.place)
         moving = Moving(seen.rows[place : place + Moving.size])
@@ -124,7 +125,7 @@ def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorPa
     elif constants.identified > 0.0:
         bristle_observer.observe(hand, contact, seen, joints, pressures, noise, assumed, fresh)
     elif constants.force_sensor == 0.0:
-        force_observer.observe(hand, seen.time, joints, estimate.unexplained, assumed.rig, assumed.period, fresh)
+        force_observer.observe(hand, seen.time, joints, pressures, estimate.unexplained, assumed.rig, assumed.period, fresh)
 
 
 @helper

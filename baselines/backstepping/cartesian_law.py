@@ -12,6 +12,7 @@ friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever 
 """
 
 from baselines.backstepping.law import smooth_sign
+from baselines.estimation import dry_friction
 from baselines.estimation.admittance import is_stiffer, square_root
 from baselines.estimation.stages import PistonEstimate
 from baselines.valve_inverse import air_at, pressure_openings
@@ -75,8 +76,10 @@ def law(seen: Seen, joints: Joints, constants: Constants, n: int) -> None:
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
 
-        drag1 = p.fc1 * smooth_sign(v1, width) + p.fv1 * v1
-        drag2 = p.fc2 * smooth_sign(v2, width) + p.fv2 * v2
+        fc1 = dry_friction.level_moving(0, v1, seen.pressure, i, p)
+        fc2 = dry_friction.level_moving(1, v2, seen.pressure, i, p)
+        drag1 = fc1 * smooth_sign(v1, width) + p.fv1 * v1
+        drag2 = fc2 * smooth_sign(v2, width) + p.fv2 * v2
         load1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, atmosphere) - drag1
         load2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, atmosphere) - drag2
         ax, ay = cartesian(-load1 / (kappa * m), load2 / m, sine, cosine)

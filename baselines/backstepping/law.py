@@ -14,6 +14,7 @@ import math
 
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
+from baselines.estimation import dry_friction
 from baselines.valve_inverse import (
     CylinderAir,
     air_at,
@@ -221,8 +222,10 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Rig, options: Options, n: i
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + pole * v1
 
-        drag1 = p.fc1 * smooth_sign(v1, width) + p.fv1 * v1
-        drag2 = p.fc2 * smooth_sign(v2, width) + p.fv2 * v2
+        fc1 = dry_friction.level_moving(0, v1, seen.pressure, i, p)
+        fc2 = dry_friction.level_moving(1, v2, seen.pressure, i, p)
+        drag1 = fc1 * smooth_sign(v1, width) + p.fv1 * v1
+        drag2 = fc2 * smooth_sign(v2, width) + p.fv2 * v2
         load1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, atmosphere) - drag1 + believed.force[0, i]
         load2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, atmosphere) - drag2 + believed.force[1, i]
         a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, gravity)
@@ -242,7 +245,7 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Rig, options: Options, n: i
         star1 = mass1 * (accel1 + transport) + (net1 - load1) - m * kappa * gravity * sine
         star1_rate = (
             mass1 * (2.0 * growth * (accel1 + transport) + jerk1 + transport_rate)
-            + (sliding * p.fc1 * smooth_sign_slope(v1, width) + p.fv1) * a1
+            + (sliding * fc1 * smooth_sign_slope(v1, width) + p.fv1) * a1
             - m * gravity * kappa * (growth * sine + cosine * turn)
         )
         star1_rate -= believed.rate[0, i]  # as F* takes off what is believed
@@ -254,7 +257,7 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Rig, options: Options, n: i
         neglected_rate = -gravity * sine * turn + v2 * turn * turn + 2.0 * r2 * turn * turn_rate
         net2 = pp2 * p.area_p2 - pn2 * p.area_n2
         star2 = m * (accel2 - compensate * neglected) + (net2 - load2)
-        star2_rate = m * (jerk2 - compensate * neglected_rate) + (sliding * p.fc2 * smooth_sign_slope(v2, width) + p.fv2) * a2
+        star2_rate = m * (jerk2 - compensate * neglected_rate) + (sliding * fc2 * smooth_sign_slope(v2, width) + p.fv2) * a2
         star2_rate -= believed.rate[1, i]
         z2 = v2 - vd2 + gains.c1[1, i] * (y2 - yd2)
         intent.force_rate[1, i] = star2_rate - m * z2 - gains.c3[1, i] * (net2 - star2)

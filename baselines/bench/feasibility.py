@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.parts.hands.user_forces import forces_of
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
@@ -34,7 +35,9 @@ def required_strength_ratio(env: Any) -> Array:
     most: Array = np.zeros(lanes)
     spare = p[at.SUPPLY] - p[at.ATMOSPHERE]
     strength = spare * np.stack([[p[at.AREA_P1], p[at.AREA_P2]], [p[at.AREA_N1], p[at.AREA_N2]]])
-    friction, viscous = np.stack([p[at.FC1], p[at.FC2]]), np.stack([p[at.FV1], p[at.FV2]])
+    # Friction is that of a cylinder at its strength: one chamber at the supply's pressure, the other at the atmosphere's.
+    full, friction, viscous = np.zeros((at.STATES, lanes)), np.empty((2, lanes)), np.stack([p[at.FV1], p[at.FV2]])
+    full[[at.PP1, at.PP2]], full[[at.PN1, at.PN2]] = p[at.SUPPLY], p[at.ATMOSPHERE]
     duration = env.steps * simulation.period * simulation.periods
     hand = deepcopy(simulation.user_force)  # one with a memory must not remember this
     for instant in np.arange(0.0, duration, STEP):
@@ -50,6 +53,8 @@ def required_strength_ratio(env: Any) -> Array:
         speed: Array = np.linalg.solve(np.moveaxis(columns, 2, 0), reference.velocity.T[..., None])[..., 0].T
         load = p[at.MASS] * (reference.acceleration + np.stack([np.zeros(lanes), p[at.GRAVITY]])) - force
         needed: Array = np.einsum("jin,jn->in", columns, load) + viscous * speed
+        full[[at.V1, at.V2]] = speed
+        dynamics.coulomb_levels(full, p, friction)
         needed += np.where(np.abs(speed) > MOVING, np.sign(speed), 0.0) * friction
         np.maximum(most, np.where(needed > 0, needed / strength[0], -needed / strength[1]).max(axis=0), out=most)
     return most

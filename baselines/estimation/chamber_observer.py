@@ -6,7 +6,7 @@ the believed spool lets through and the dead volume, and corrected by what its c
 so that noise is averaged over 1/w without the delay of a filter: only the model's error of P' lags, and by 1/w.
 """
 
-from baselines.valve_inverse import driving_flows
+from baselines.valve_inverse import driving_flows, valve_of
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
@@ -17,11 +17,13 @@ from birthsim_env.physics.compiled.records import Rows, rows
 
 @helper
 def predicted_pressure(
-    pressure: float, opening: float, area: float, length: float, length_rate: float, period: float, p: Rig
+    chamber: int, pressure: float, opening: float, area: float, length: float, length_rate: float, period: float, p: Rig
 ) -> float:
-    """Pressure of a chamber after one period of a valve's ``opening``, Pa, by (6); ``length`` is that of its air, m."""
-    supply = valves.supply_conductance(opening, p.conductance, p.leakage)
-    exhaust = valves.exhaust_conductance(opening, p.conductance, p.leakage)
+    """Pressure of a ``chamber``, 0 to 3, after one period of its valve's ``opening``, Pa, by (6); ``length`` is that of its
+    air, m."""
+    valve = valve_of(chamber, p)
+    supply = valves.edge_conductance(opening, valve.supply, p.conductance, p.leakage)
+    exhaust = valves.edge_conductance(-opening, valve.exhaust, p.conductance, p.leakage)
     fill, drain = driving_flows(pressure, p)
     flow = supply * fill - exhaust * drain
     whole, gas_t = max(length, 0.0) + p.dead_volume / area, p.gas * p.temperature
@@ -60,6 +62,7 @@ def observe(chambers: Chambers, measured: Array, joints: Joints, p: Rig, period:
             opening = chambers.opening[chamber, i]
             away = chambers.spool[chamber, i] - opening
             expected = predicted_pressure(
+                chamber,
                 chambers.pressure[chamber, i],
                 opening + mean * away,
                 area,

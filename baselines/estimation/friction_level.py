@@ -7,6 +7,7 @@ while the piston slides as u says. Only sliding in both directions separates the
 what the observer found besides, so that it does not depend on what has been learned.
 """
 
+from baselines.estimation import dry_friction
 from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.compilation import helper
@@ -36,16 +37,24 @@ class Friction(Rows):
 
 @helper
 def learn(
-    friction: Friction, drag: Array, joints: Joints, unexplained: Array, rate: float, assumed: AssumedParameters, fresh: Array
+    friction: Friction,
+    drag: Array,
+    joints: Joints,
+    pressures: Array,
+    unexplained: Array,
+    rate: float,
+    assumed: AssumedParameters,
+    fresh: Array,
 ) -> None:
     """Carries ``friction`` on by one period.
 
-    ``drag`` (2, N), N, is the believed friction along the reference; ``unexplained`` (2, N), N, is R; ``rate``, a in 1/s.
+    ``drag`` (2, N), N, is the believed friction along the reference, with chambers at ``pressures`` (4, N), Pa; ``unexplained``
+    (2, N), N, is R; ``rate``, a in 1/s.
     """
     p, period = assumed.rig, assumed.period
     for i in range(fresh.shape[0]):
         for cylinder in range(2):
-            coulomb = p.fc1 if cylinder == 0 else p.fc2
+            coulomb = dry_friction.level_moving(cylinder, drag[cylinder, i], pressures, i, p)
             if fresh[i] > 0.0:
                 friction.level[cylinder, i], friction.offset[cylinder, i], friction.sliding[cylinder, i] = 1.0, 0.0, 0.0
             if coulomb <= 0.0:

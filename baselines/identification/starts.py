@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.identification.prediction import predict
-from baselines.identification.windows import FREE, Windows
+from baselines.identification.windows import FREE, Windows, coulomb_levels_of
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
@@ -156,11 +156,12 @@ def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> 
     before = (ends[:, 0] - np.roll(windows.state, -1, axis=1))[list(FREE)] / SPREAD[:, None]
     part, tries = windows.some(bad), [np.nan_to_num(np.roll(before, 1, axis=1).T[bad])]
     column = parameter_column(rig)
+    levels = coulomb_levels_of(part.state, column)
     signs_of_both = itertools.product((-1.0, 0.0, 1.0), repeat=2)
     for signs, others in itertools.product(signs_of_both, (best[bad], np.zeros_like(best[bad]))):
         bent = others.copy()
-        for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, (at.FC1, at.FC2), signs, strict=True):
-            bent[:, free_row] = (sign * column[level] / column[at.S0] - part.state[row]) / SPREAD[free_row]
+        for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, levels, signs, strict=True):
+            bent[:, free_row] = (sign * level / column[at.S0] - part.state[row]) / SPREAD[free_row]
         tries.append(bent)
     found, left = settle(windows.some(np.tile(bad, len(tries))), noise, rig, np.concatenate(tries), None)
     cost = np.sum(left**2, axis=1).reshape(len(tries), -1)

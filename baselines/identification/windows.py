@@ -16,7 +16,7 @@ from baselines.identification.budget import Budget
 from baselines.identification.trial import Trial, bridged, fresh_rows, numbers
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.dynamics import steps_in
+from birthsim_env.physics.dynamics import coulomb_levels, steps_in
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.spools import admit_lanes, are_perfect
@@ -150,13 +150,19 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     joints = np.empty((4, len(starts)))
     pistons_at(motion, Rig(column), joints)
     state[[at.Y1, at.Y2, at.V1, at.V2]] = joints
-    for z, v, level in ((at.Z1, at.V1, at.FC1), (at.Z2, at.V2, at.FC2)):
-        state[z] = np.tanh(state[v] / 0.01) * column[level] / column[at.S0]
     wide = 2 * round(0.005 / period) + 3
     smooth = savgol_filter(bridged(trial.pressures), wide, 2, axis=1)
     state[list(at.PRESSURES)] = smooth[:, starts]
+    state[[at.Z1, at.Z2]] = np.tanh(state[[at.V1, at.V2]] / 0.01) * coulomb_levels_of(state, column) / column[at.S0]
     state[list(at.TEMPERATURES)] = column[at.TEMPERATURE]
     return state
+
+
+def coulomb_levels_of(state: Array, column: Array) -> Array:
+    """Coulomb friction of both pistons (2, W), N, in states (18, W) of one rig, a ``column`` (PARAMETERS,)."""
+    levels = np.empty((2, state.shape[1]))
+    coulomb_levels(state, np.repeat(column[:, None], state.shape[1], axis=1), levels)
+    return levels
 
 
 def _parabola(times: Array, values: Array) -> tuple[float, float]:
@@ -178,7 +184,7 @@ def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: fl
 
 
 def admitted_openings(trial: Trial, column: Array) -> Array:
-    """What the openings of a log (4, T) become behind deadband and limit of the valves."""
+    """What the openings of a log (4, T) become behind the limit of the valves."""
     if are_perfect(column[:, None]):
         return trial.openings
     lanes, opening = trial.openings.shape[1], np.empty_like(trial.openings)

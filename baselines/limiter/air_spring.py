@@ -11,7 +11,7 @@ oscillation the acceleration averages to nothing.
 
 import math
 
-from baselines.valve_inverse import driving_flows
+from baselines.valve_inverse import driving_flows, valve_of
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import InPlane, Joints
 from birthsim_env.physics import geometry, mechanics, valves
@@ -66,4 +66,4 @@ def passive_openings(
         forces[chamber, i] += rate * (balanced - forces[chamber, i])
         flow = (forces[chamber, i] * (half + p.dead_volume / area + outward * wanted) - force * length) / gas_t
         fill, drain = driving_flows(seen.pressure[chamber, i], p)
-        opening[chamber, i] = valves.opening_for_flow(flow, fill, drain, p.conductance, p.leakage)
+        opening[chamber, i] = valves.opening_for_flow(flow, fill, drain, valve_of(chamber, p))

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from baselines.backstepping.law import JointReference
+from baselines.estimation import dry_friction
 from baselines.estimation.stages import PistonEstimate
 from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Seen
@@ -50,8 +51,9 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 
 
 @helper
-def needed_forces(tracked: Tracking, hand: Array, p: Rig, fraction: float, n: int) -> None:
-    """Writes what is needed for the motion and its pistons, while the ``hand`` pushes with (2, N), N."""
+def needed_forces(tracked: Tracking, hand: Array, pressures: Array, p: Rig, fraction: float, n: int) -> None:
+    """Writes what is needed for the motion and its pistons, while the ``hand`` pushes with (2, N), N, and the chambers are at
+    ``pressures`` (4, N), Pa."""
     wanted, motion, needed, push = tracked.wanted, tracked.motion, tracked.needed, InPlane(hand)
     for i in range(n):
         y1, y2, v1, v2 = wanted.position[0, i], wanted.position[1, i], wanted.speed[0, i], wanted.speed[1, i]
@@ -66,8 +68,9 @@ def needed_forces(tracked: Tracking, hand: Array, p: Rig, fraction: float, n: in
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
         along_rate = sine * jx - cosine * jy - turn * across
         across_rate = -cosine * jx - sine * jy + turn * along
-        drag1, drag1_rate = friction_ahead(v1, wanted.acceleration[0, i], fraction * p.fc1, p.fv1)
-        drag2, drag2_rate = friction_ahead(v2, wanted.acceleration[1, i], fraction * p.fc2, p.fv2)
+        fc1, fc2 = dry_friction.level_moving(0, v1, pressures, i, p), dry_friction.level_moving(1, v2, pressures, i, p)
+        drag1, drag1_rate = friction_ahead(v1, wanted.acceleration[0, i], fraction * fc1, p.fv1)
+        drag2, drag2_rate = friction_ahead(v2, wanted.acceleration[1, i], fraction * fc2, p.fv2)
         needed.force[0, i] = kappa * across + p.atmosphere * (p.area_p1 - p.area_n1) + drag1
         needed.force[1, i] = along + p.atmosphere * (p.area_p2 - p.area_n2) + drag2
         needed.rate[0, i] = kappa * (across_rate + growth * across) + drag1_rate
@@ -86,7 +89,7 @@ class Constants(Numbers):
 def _look_ahead(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     tracked = Tracking(seen.intermediate[: Tracking.size])
     piston_reference(tracked.motion.rows, constants.rig, tracked.wanted.rows, n)
-    needed_forces(tracked, seen.user_force, constants.rig, constants.fraction, n)
+    needed_forces(tracked, seen.user_force, seen.pressure, constants.rig, constants.fraction, n)
     return 0
 
 

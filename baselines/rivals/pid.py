@@ -18,7 +18,7 @@ from typing import ClassVar
 from baselines.admittance.law import beyond
 from baselines.rivals.feedforward import Tracking
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
-from baselines.valve_inverse import CylinderAir, air_at, driving_flows
+from baselines.valve_inverse import CylinderAir, air_at, driving_flows, valve_of
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -86,8 +86,8 @@ def control(world: int, seen: Seen, memory: Integrals, constants: Constants, tab
             flow_p = flow_for(constants.pressure_gain * (pp_set - pp), pp, ap, air.length_p, v, index, gas_t)
             flow_n = flow_for(constants.pressure_gain * (pn_set - pn), pn, an, air.length_n, -v, index, gas_t)
             (fill_p, drain_p), (fill_n, drain_n) = driving_flows(pp, p), driving_flows(pn, p)
-            opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p.conductance, p.leakage)
-            opening_n = valves.opening_for_flow(flow_n, fill_n, drain_n, p.conductance, p.leakage)
+            opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, valve_of(row, p))
+            opening_n = valves.opening_for_flow(flow_n, fill_n, drain_n, valve_of(row + 1, p))
             opening[row, i], opening[row + 1, i] = opening_p, opening_n
             rate = spring * constants.integral_rate * beyond(error, zone / scale) if given == force else 0.0
             carry_on(memory, cylinder, i, summed, rate, constants.period, (opening_p, opening_n))

@@ -66,7 +66,7 @@ def predict_horizon(seen: Seen, memory: Memory, estimate: Estimate, constants: C
     load(estimate.inputs.force, 0, n, inputs.force)
     load(memory.bristle, 0, n, bristles)
     admittance.forecast(offset, seen.asked, estimate.inputs.force, constants.compliance, ticks, inputs.motion)
-    reference_friction.forecast(inputs.motion, constants.model.rig, steps, bristles, inputs.unseen)
+    reference_friction.forecast(inputs.motion, inputs.pressure, constants.model.rig, steps, bristles, inputs.unseen)
     for k in range(NODES):
         for axis in range(2):
             row = 2 * k + axis

@@ -39,7 +39,7 @@ def require_plain(plant: Plant) -> None:
     if not options.are_off(p):
         names += ["air.supply_conductance", "chambers.tube_length", "mechanics.mode_frequency"]
     if not spools.are_perfect(p):
-        names += ["valves.deadband", "valves.hysteresis", "valves.opening_limit"]
+        names += ["valves.hysteresis", "valves.opening_limit"]
     if names:
         raise ValueError(f"gradients of a rig with one of {', '.join(names)}; allowed: these at their defaults")
 

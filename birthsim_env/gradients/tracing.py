@@ -49,7 +49,8 @@ def select(condition: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any
 
 def _merged(condition: Value, yes: Any, no: Any) -> Any:
     if isinstance(yes, tuple) and isinstance(no, tuple):
-        return tuple(_merged(condition, a, b) for a, b in zip(yes, no, strict=True))
+        merged = [_merged(condition, a, b) for a, b in zip(yes, no, strict=True)]
+        return type(yes)(*merged) if hasattr(yes, "_fields") else tuple(merged)
     if yes is None or no is None:
         return no if yes is None else yes
     return condition.graph.select(condition, yes, no)

@@ -15,7 +15,7 @@ from birthsim_env.loop.rows import ACTION, OPENING, STATE, Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
 from birthsim_env.physics import valves
-from birthsim_env.physics.air import driving_flows
+from birthsim_env.physics.air import driving_flows, valve_of
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -126,15 +126,14 @@ def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: i
                     drain_n,
                     half / (half + y),
                     half / (half - y),
-                    p[at.CONDUCTANCE, i],
-                    p[at.LEAKAGE, i],
+                    valve_of(p, i, chamber_p),
+                    valve_of(p, i, chamber_n),
                 )
                 openings[chamber_p, i], openings[chamber_n, i] = opened, -opened
             else:
                 flow_p, flow_n = full * wanted[chamber_p, i], full * wanted[chamber_n, i]
-                conductance, leak = p[at.CONDUCTANCE, i], p[at.LEAKAGE, i]
-                openings[chamber_p, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, conductance, leak)
-                openings[chamber_n, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, conductance, leak)
+                openings[chamber_p, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, valve_of(p, i, chamber_p))
+                openings[chamber_n, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, valve_of(p, i, chamber_n))
     return 0
 
 

@@ -4,6 +4,7 @@ State rows are those of ``lanes.STATE_NAMES``: P1, N1, P2, N2 in this order, of 
 """
 
 from birthsim_env.physics import chambers, valves
+from birthsim_env.physics.characteristic import Edge
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
@@ -27,31 +28,51 @@ def driving_flows(p: Array, i: int, pressure: float, inverse: float, inside: flo
 
 
 @helper
-def orifice_flows(p: Array, i: int, pressure: float, opening: float, inverse: float, inside: float) -> tuple[float, float]:
-    """Mass flows of a chamber whose spool is at ``opening``: in from the supply and out to the atmosphere, kg/s.
+def supply_edge(p: Array, i: int, k: int) -> Edge:
+    """The edge through which the valve of chamber ``k`` fills it."""
+    return Edge(p[at.SUPPLY_OVERLAP_P1 + k, i], p[at.SUPPLY_SLOPE_P1 + k, i], p[at.SUPPLY_BEND_P1 + k, i])
+
+
+@helper
+def exhaust_edge(p: Array, i: int, k: int) -> Edge:
+    """The edge through which the valve of chamber ``k`` empties it."""
+    return Edge(p[at.EXHAUST_OVERLAP_P1 + k, i], p[at.EXHAUST_SLOPE_P1 + k, i], p[at.EXHAUST_BEND_P1 + k, i])
+
+
+@helper
+def valve_of(p: Array, i: int, k: int) -> valves.Valve:
+    """The valve of chamber ``k``."""
+    full, leakage, crossing = p[at.CONDUCTANCE, i], p[at.LEAKAGE, i], p[at.CROSSING, i]
+    return valves.Valve(supply_edge(p, i, k), exhaust_edge(p, i, k), full, leakage, crossing)
+
+
+@helper
+def orifice_flows(
+    p: Array, i: int, k: int, pressure: float, opening: float, inverse: float, inside: float
+) -> tuple[float, float]:
+    """Mass flows of chamber ``k`` whose spool is at ``opening``: in from the supply and out to the atmosphere, kg/s.
 
     ``inverse`` is 1/P of the chamber, ``inside`` the coldness of its air.
     """
     fill, drain = driving_flows(p, i, pressure, inverse, inside)
-    supply = valves.supply_conductance(opening, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    exhaust = valves.exhaust_conductance(opening, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    supply = valves.edge_conductance(opening, supply_edge(p, i, k), p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    exhaust = valves.edge_conductance(-opening, exhaust_edge(p, i, k), p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
     return supply * fill, exhaust * drain
 
 
 @helper
-def flows_of(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> tuple[float, float]:
-    """``orifice_flows`` of a chamber given by its state rows alone."""
-    return orifice_flows(p, i, x[pressure, i], x[spool, i], 1.0 / x[pressure, i], p[at.T0, i] / x[temperature, i])
+def flows_of(x: Array, p: Array, i: int, k: int) -> tuple[float, float]:
+    """``orifice_flows`` of chamber ``k`` by the state alone."""
+    pressure, temperature = x[at.PP1 + 2 * k, i], x[at.TP1 + 2 * k, i]
+    return orifice_flows(p, i, k, pressure, x[at.S1P + k, i], 1.0 / pressure, p[at.T0, i] / temperature)
 
 
 @helper
 def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
     """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
     for i in range(state.shape[1]):
-        flows[0, i], flows[4, i] = flows_of(state, parameters, i, at.PP1, at.TP1, at.S1P)
-        flows[1, i], flows[5, i] = flows_of(state, parameters, i, at.PN1, at.TN1, at.S1N)
-        flows[2, i], flows[6, i] = flows_of(state, parameters, i, at.PP2, at.TP2, at.S2P)
-        flows[3, i], flows[7, i] = flows_of(state, parameters, i, at.PN2, at.TN2, at.S2N)
+        for k in range(4):
+            flows[k, i], flows[4 + k, i] = flows_of(state, parameters, i, k)
 
 
 @helper
@@ -107,7 +128,7 @@ def chamber_rates(
         energy = pressure * volume
         inverse = 1.0 / (energy * t)
         coldness = p[at.T0, i] * (energy * inverse)
-        supplied, exhausted = orifice_flows(p, i, pressure, x[at.S1P + k, i], volume * (t * inverse), coldness)
+        supplied, exhausted = orifice_flows(p, i, k, pressure, x[at.S1P + k, i], volume * (t * inverse), coldness)
         dx[at.PP1 + 2 * k], dx[at.TP1 + 2 * k] = exchange(
             p, i, pressure, t, other[k], area[k], perimeter[k], length[k], length_rate[k], supplied, exhausted, inverse
         )

@@ -22,15 +22,28 @@ INTEGRATION_STEP = STEP.seconds
 
 
 @helper
-def piston_friction(
-    x: Array, p: Array, i: int, speed: int, bristle: int, coulomb: int, static: int, viscous: int
-) -> tuple[float, float]:
-    """Friction on a rod, N, positive along the motion that it holds back, and the rate of its bristle, m/s.
+def coulomb_level(x: Array, p: Array, i: int, cylinder: int) -> float:
+    """Fc of piston 0 or 1 at its pressures, of the way in which it moves, N."""
+    pressure_p, pressure_n = x[at.PP1 + 4 * cylinder, i], x[at.PN1 + 4 * cylinder, i]
+    coulomb, growth, asymmetry = (at.FC1, at.FP1, at.ASYMMETRY1) if cylinder == 0 else (at.FC2, at.FP2, at.ASYMMETRY2)
+    level = friction.pressed_level(p[coulomb, i], p[growth, i], pressure_p, pressure_n, p[at.ATMOSPHERE, i])
+    return friction.level_along(x[at.V1 + 2 * cylinder, i], level, p[asymmetry, i])
 
-    The piston is given by its state rows, and its parameters by theirs.
-    """
-    v, z, s0, fc, fv = x[speed, i], x[bristle, i], p[at.S0, i], p[coulomb, i], p[viscous, i]
-    weakness = friction.inverse_level(v, fc, p[static, i], p[at.STRIBECK, i])
+
+@helper
+def coulomb_levels(state: Array, parameters: Array, levels: Array) -> None:
+    """Writes ``coulomb_level`` of both pistons in states (18, N) of rigs (PARAMETERS, N), N, (2, N)."""
+    for cylinder in range(2):
+        for i in range(state.shape[1]):
+            levels[cylinder, i] = coulomb_level(state, parameters, i, cylinder)
+
+
+@helper
+def piston_friction(x: Array, p: Array, i: int, cylinder: int) -> tuple[float, float]:
+    """Friction on rod 0 or 1, N, positive along the motion that it holds back, and the rate of its bristle, m/s."""
+    v, z, s0 = x[at.V1 + 2 * cylinder, i], x[at.Z1 + cylinder, i], p[at.S0, i]
+    fc, fv = coulomb_level(x, p, i, cylinder), (p[at.FV1, i] if cylinder == 0 else p[at.FV2, i])
+    weakness = friction.inverse_level(v, fc, p[at.STATIC_RATIO, i] * fc, p[at.STRIBECK, i])
     is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
     rate = friction.bristle_rate_by_law(v, z, weakness, s0, is_lugre, p[at.BREAKAWAY, i], p[at.STEEPNESS, i])
     held = friction.lugre_force(v, z, rate, s0, p[at.S1, i], fv)
@@ -49,8 +62,8 @@ def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int, togeth
         y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
     )
 
-    friction1, dz1 = piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
-    friction2, dz2 = piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
+    friction1, dz1 = piston_friction(x, p, i, 0)
+    friction2, dz2 = piston_friction(x, p, i, 1)
     force1 = (
         mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
         - friction1

@@ -1,10 +1,9 @@
-"""Control board and sensors as data: what the sensor models ``lab`` and ``honest`` compute with."""
+"""Control board and sensors as data: what the sensor models compute with; ``joint_sensors`` has those at the cylinders."""
 
 from dataclasses import dataclass
 
-from birthsim_env.physics.rig.declaration import Prior, Section, parameter
-
-EITHER_WAY = "an episode draws up to this either way"
+from birthsim_env.physics.joint_sensors import EITHER_WAY, JointSensors
+from birthsim_env.physics.rig.declaration import Prior, parameter
 
 SLOWEST = 40.0
 """Hz, of an acceleration sensor. In eight drawn circles with ``honest`` sensors ``admittance-adaptive`` is as good with 40 Hz
@@ -12,13 +11,14 @@ as with 300, to 0.2 mm; with 20 Hz its settled error is 1.9 instead of 0.7 mm, a
 
 
 @dataclass(frozen=True)
-class Electronics(Section, plant=False, shared=True):
+class Electronics(JointSensors, plant=False, shared=True):
     """Control board and the sensors of a laboratory.
 
     The first five parameters, bandwidth and noise of the acceleration are those of the sensor models ``lab`` and ``honest``,
     all others those of ``honest`` alone: 0 switches an error off (of ``force_bandwidth``: the low-pass; of bits: the
     converter). The tracker is registered to the rig at one point, where its distortion and scale do no harm and its noise is
-    ``position_noise``. Ranges are drawn from with ``honest`` sensors.
+    ``position_noise``. Encoders and gauges are those of sensor models that are named after them, which have the errors of
+    ``honest`` otherwise. Ranges are drawn from with all of these.
     """
 
     control_period: float = parameter("s", "control period", default=0.001, source="assumed", least=0.00025, most=0.01)

@@ -9,6 +9,11 @@ Up to the break-away deflection, q <= z_ba / z_ss, and whenever z opposes v, alp
 creeps. Beyond, alpha rises to 1 at q = 1, so that steady sliding is LuGre's. LuGre itself is alpha = 1 throughout; it drifts
 under any oscillating force. The authors' sine transition is replaced by the cubic 3 s^2 - 2 s^3, which needs only products. It
 has the same ends, middle and symmetry, and is at most 0.010 away.
+
+Pressure presses the lips of a piston's seals to the bore, so that of both levels
+    Fc = (F0 + k (pP + pN)) (1 + a sgn(v)),  Fs = Fs/Fc Fc
+with gauge pressures. Either way of motion has its own level (Zhu 2006, two of them); where sgn(v) jumps, |v|/G and the force of
+(4) are zero, so that no law jumps.
 """
 
 import math
@@ -26,6 +31,18 @@ with too high a limit steps would stall short of the steady deflection instead o
 
 SMALLEST_LEVEL = 1e-9
 """N. Keeps s0 |v| / G finite where the friction level is zero; the bristle then carries no force."""
+
+
+@helper
+def pressed_level(coulomb: float, growth: float, pressure_p: float, pressure_n: float, atmosphere: float) -> float:
+    """F0 + k (pP + pN), N, of absolute pressures, for F0 = ``coulomb`` and k = ``growth``; never below zero."""
+    return max(coulomb + growth * (pressure_p + pressure_n - 2.0 * atmosphere), 0.0)
+
+
+@helper
+def level_along(speed: float, level: float, asymmetry: float) -> float:
+    """The level of the way in which a piston moves, N, from that without direction."""
+    return level * (1.0 + (asymmetry if speed > 0.0 else -asymmetry))
 
 
 @helper

@@ -58,14 +58,13 @@ def lagged_chamber(
     pressure: int,
     temperature: int,
     other: int,
-    spool: int,
     area: int,
     perimeter: int,
     length: float,
     length_rate: float,
 ) -> float:
     """Rates of a chamber behind a tube, where there is one; returns what its valve draws from the supply, kg/s."""
-    supplied, exhausted = air.flows_of(x, p, i, pressure, temperature, spool)
+    supplied, exhausted = air.flows_of(x, p, i, chamber)
     row = at.STATES + FLOWS + chamber
     rate = p[at.TUBE_RATE, i]
     dx[row], dx[row + 4] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
@@ -111,11 +110,11 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
         y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
         half1, half2, rates = own[at.HALF_L1, i], own[at.HALF_L2, i], dx[:, i]
         drawn = lagged_chamber(
-            x, own, rates, i, 0, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
-        ) + lagged_chamber(x, own, rates, i, 1, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
+            x, own, rates, i, 0, at.PP1, at.TP1, at.TN1, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
+        ) + lagged_chamber(x, own, rates, i, 1, at.PN1, at.TN1, at.TP1, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
         drawn += lagged_chamber(
-            x, own, rates, i, 2, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
-        ) + lagged_chamber(x, own, rates, i, 3, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
+            x, own, rates, i, 2, at.PP2, at.TP2, at.TN2, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
+        ) + lagged_chamber(x, own, rates, i, 3, at.PN2, at.TN2, at.TP2, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
         source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
         filled = own[at.LINE, i] * valves.driving_flow(
             source,

@@ -111,8 +111,8 @@ class Plant:
     def derivatives(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> Array:
         """d(state)/dt, (18, num_envs), for a state (18, num_envs), openings (4, num_envs) and forces (2, num_envs), N.
 
-        The openings are those that spools go to: deadband, hysteresis and limit of the valves are ``advance``'s, and so are
-        tubes and the handle (``physics.options``).
+        The openings are those that spools go to: hysteresis and limit of the valves are ``advance``'s, and so are tubes
+        and the handle (``physics.options``).
         """
         x, force = checked("state", state, self.state.shape, "SI"), checked("user_force", user_force, (2, self.num_envs), "N")
         rates = np.empty_like(x)

@@ -1,11 +1,9 @@
-"""What lies between a commanded opening and the one that a spool goes to: hysteresis, deadband, and the end of its stroke.
+"""What lies between a commanded opening and the one that a spool goes to: hysteresis, and the end of its stroke.
 
 Hysteresis is the play operator of Krejci and Prandtl: the command drags an inner one along that may lag behind by half the
-width. Within the deadband nothing opens; beyond it the characteristic is straight again, up to full opening. All act on the
-command, before the lag of the spool, and all are off by default.
+width. Both act on the command, before the lag of the spool, and both are off by default. Where a spool opens nothing yet is
+its ``characteristic``.
 """
-
-import math
 
 import numpy as np
 
@@ -21,9 +19,9 @@ def dragged(command: float, last: float, width: float) -> float:
 
 
 @helper
-def admitted(command: float, deadband: float, limit: float) -> float:
+def admitted(command: float, limit: float) -> float:
     """The opening that a command gives, in [-``limit``, ``limit``]."""
-    return math.copysign(min(max(abs(command) - deadband, 0.0) / (1.0 - deadband), limit), command)
+    return max(-limit, min(limit, command))
 
 
 @helper
@@ -32,7 +30,7 @@ def admit(command: Array, p: Array, last: Array, opening: Array, n: int) -> None
     for valve in range(4):
         for i in range(n):
             last[valve, i] = dragged(command[valve, i], last[valve, i], p[at.PLAY, i])
-            opening[valve, i] = admitted(last[valve, i], p[at.DEADBAND, i], p[at.OPENING_LIMIT, i])
+            opening[valve, i] = admitted(last[valve, i], p[at.OPENING_LIMIT, i])
 
 
 @kernel
@@ -43,5 +41,4 @@ def admit_lanes(command: Array, parameters: Array, last: Array, opening: Array) 
 
 def are_perfect(parameters: Array) -> bool:
     """Whether no lane's valves have any of it, (PARAMETERS, N)."""
-    off = not parameters[at.DEADBAND].any() and not parameters[at.PLAY].any()
-    return off and bool(np.all(parameters[at.OPENING_LIMIT] == 1.0))
+    return not parameters[at.PLAY].any() and bool(np.all(parameters[at.OPENING_LIMIT] == 1.0))

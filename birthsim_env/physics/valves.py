@@ -2,13 +2,16 @@
 
     q = Cx rho0 Pu sqrt(T0/Tu) psi(Pd/Pu),  psi = 1 below b, sqrt(1 - ((x-b)/(1-b))^2) above, linear to zero above 0.99
 
-Every chamber has an orifice to the supply, C max(s, 0) + Cl, and one to the atmosphere, C max(-s, 0) + Cl.
+Every chamber has an orifice to the supply and one to the atmosphere. Each is a metering edge of its valve's spool, C g + Cl,
+with g of ``characteristic``.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from birthsim_env.physics.characteristic import Edge, common_opening, opened_part, opening_of
 from birthsim_env.physics.compiled.compilation import helper
 
 LINEAR_RATIO = 0.99
@@ -61,37 +64,35 @@ def driving_flow(
     return size if forward else -size
 
 
-@helper
-def supply_conductance(opening: float, conductance: float, leakage: float) -> float:
-    """Conductance of the supply orifice at a spool opening in [-1, 1], m3/(s Pa)."""
-    return conductance * max(opening, 0.0) + leakage
+class Valve(NamedTuple):
+    """A valve as whoever inverts its characteristic knows it: its edges, conductance and leakage, m3/(s Pa), and the part of
+    the conductance over which the overlap is crossed."""
+
+    supply: Edge
+    exhaust: Edge
+    conductance: float
+    leakage: float
+    crossing: float
 
 
 @helper
-def exhaust_conductance(opening: float, conductance: float, leakage: float) -> float:
-    """Conductance of the exhaust orifice at a spool opening in [-1, 1], m3/(s Pa)."""
-    return conductance * max(-opening, 0.0) + leakage
+def edge_conductance(opening: float, edge: Edge, conductance: float, leakage: float) -> float:
+    """Conductance of the orifice behind an edge at a spool opening in [-1, 1], m3/(s Pa); that of the exhaust opens at -s."""
+    return conductance * opened_part(opening, edge) + leakage
 
 
 @helper
-def opening_for(wanted: float, up: float, down: float, conductance: float) -> float:
-    """Opening in [-1, 1] for a flow ``wanted`` (kg/s) beyond leakage, of which an opening of 1 gives conductance x ``up``.
-
-    An opening of -1 gives -conductance x ``down``. Where the side that is needed has no driving pressure it stays shut.
-    """
-    driving = up if wanted > 0.0 else down
-    opened = wanted / (conductance * max(driving, 1e-9))
-    return max(-1.0, min(1.0, opened)) if driving > 0.0 else 0.0
-
-
-@helper
-def opening_for_flow(flow: float, fill: float, drain: float, conductance: float, leakage: float) -> float:
-    """Opening in [-1, 1] at which a chamber's net mass flow is ``flow`` (kg/s): the exact inverse of the characteristic.
+def opening_for_flow(flow: float, fill: float, drain: float, valve: Valve) -> float:
+    """Opening in [-1, 1] at which a chamber's net mass flow is ``flow`` (kg/s): the inverse of the characteristic.
 
     ``fill`` and ``drain`` are the flows per unit of conductance through the supply and exhaust orifices at the present
-    pressures. Saturates where the flow is too large to be had, and stays shut where opening would let it run the other way.
+    pressures. It is exact but for flows with which the overlap is crossed. It saturates where the flow is too large to be had,
+    and the valve stays shut where opening would let it run the other way.
     """
-    return opening_for(flow - leakage * (fill - drain), fill, drain, conductance)
+    wanted = flow - valve.leakage * (fill - drain)
+    driving, edge = (fill, valve.supply) if wanted > 0.0 else (drain, valve.exhaust)
+    part = abs(wanted) / (valve.conductance * max(driving, 1e-9))
+    return math.copysign(opening_of(part, edge, valve.crossing), wanted) if driving > 0.0 else 0.0
 
 
 @helper
@@ -103,14 +104,20 @@ def opening_for_active_flow(
     drain_n: float,
     fraction_p: float,
     fraction_n: float,
-    conductance: float,
-    leakage: float,
+    valve_p: Valve,
+    valve_n: Valve,
 ) -> float:
     """Opening of ONE 5/3 valve (chamber N gets the opposite) at which fraction_p qp - fraction_n qn is ``active``, kg/s.
 
-    With ``fraction = l / (2 L)`` of each chamber the weighted difference is qA of (8).
+    With ``fraction = l / (2 L)`` of each chamber the weighted difference is qA of (8). Opening the edge of chamber P to the
+    supply opens that of chamber N to the exhaust, which have the numbers of ``valve_p`` and ``valve_n``.
     """
-    wanted = active - leakage * (fraction_p * (fill_p - drain_p) - fraction_n * (fill_n - drain_n))
-    return opening_for(
-        wanted, fraction_p * fill_p + fraction_n * drain_n, fraction_p * drain_p + fraction_n * fill_n, conductance
-    )
+    wanted = active - valve_p.leakage * (fraction_p * (fill_p - drain_p) - fraction_n * (fill_n - drain_n))
+    opens = wanted > 0.0
+    driving_p, edge_p = (fraction_p * fill_p, valve_p.supply) if opens else (fraction_p * drain_p, valve_p.exhaust)
+    driving_n, edge_n = (fraction_n * drain_n, valve_n.exhaust) if opens else (fraction_n * fill_n, valve_n.supply)
+    driving = driving_p + driving_n
+    most = max(driving, 1e-9)
+    part = abs(wanted) / (valve_p.conductance * most)
+    opened = common_opening(part, driving_p / most, edge_p, edge_n, valve_p.crossing)
+    return math.copysign(opened, wanted) if driving > 0.0 else 0.0

@@ -74,7 +74,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
 
     # The code serves worn valves and tubes too, and a start that leaves what any of them remembers.
     worn, tubes = column.copy(), column.copy()
-    worn[at.DEADBAND], tubes[at.TUBE_RATE] = 0.01, 100.0
+    worn[at.PLAY], tubes[at.TUBE_RATE] = 0.01, 100.0
     learns = [LEARNING] if policies else []
     chosen = [*names("controller", listed=True), *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period
@@ -146,8 +146,8 @@ def rig_numbers(rig: Parameters) -> dict[str, Any]:
     return {
         "column": parameter_column(rig).tolist(),
         "coulomb": [one.coulomb_friction for one in cylinders],
+        "pressed": [one.pressure_friction for one in cylinders],
         "viscous": [one.viscous_friction for one in cylinders],
-        "static_ratio": rig.friction.static_ratio,
     }
 
 

@@ -4,7 +4,6 @@ from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import block
 from birthsim_env.physics import air, dynamics
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -21,10 +20,10 @@ def look_inside(x: Array, p: Array, rows: Array) -> None:
     State ``x`` (18, N), parameters ``p`` (PARAMETERS, N).
     """
     for i in range(x.shape[1]):
-        rows[0, i], _ = dynamics.piston_friction(x, p, i, at.V1, at.Z1, at.FC1, at.FS1, at.FV1)
-        rows[1, i], _ = dynamics.piston_friction(x, p, i, at.V2, at.Z2, at.FC2, at.FS2, at.FV2)
+        rows[0, i], _ = dynamics.piston_friction(x, p, i, 0)
+        rows[1, i], _ = dynamics.piston_friction(x, p, i, 1)
         for k in range(4):
-            supplied, exhausted = air.flows_of(x, p, i, at.PRESSURES[k], at.TEMPERATURES[k], at.SPOOLS[k])
+            supplied, exhausted = air.flows_of(x, p, i, k)
             rows[2 + k, i] = supplied - exhausted
 
 

@@ -26,9 +26,7 @@ def options() -> str:
     rows = [["parameter", "default", "unit", "drawn from, on request", "meaning", "source"]]
     for name, one in DECLARED.items():
         if one.range and one.on_request:
-            low, high = one.range
-            drawn = f"{low:g} to {high:g}"
-            rows.append([f"`{name}`", f"{one.default:g}", one.unit.removeprefix("-"), drawn, one.about, one.source])
+            rows.append([f"`{name}`", f"{one.default:g}", one.unit.removeprefix("-"), one.drawn, one.about, one.source])
     return _table(rows)
 
 
@@ -46,4 +44,4 @@ def _allowed(one: Parameter) -> str:
 
 
 def _drawn(one: Parameter) -> str:
-    return f"{'on request: ' if one.on_request else ''}{one.range[0]:g} to {one.range[1]:g}" if one.range else ""
+    return f"{'on request: ' if one.on_request else ''}{one.drawn}"

@@ -19,7 +19,7 @@ def openings(cases: Array, rig: Parameters = RIG) -> tuple[Array, Array]:
     """Force first and neither first, (2, N) each, of cylinder 2; ``cases`` (6, N): dF/dt, dK/dt, Pp, Pn, y, v."""
     areas, p, found = derived_law.areas(rig.cylinder2), Rig(parameter_column(rig)), []
     for rate, stiffness_rate, pp, pn, y, v in cases.T:
-        air = CylinderAir(pp, pn, *areas, LENGTH / 2 + y, LENGTH / 2 - y, v)
+        air = CylinderAir(1, pp, pn, *areas, LENGTH / 2 + y, LENGTH / 2 - y, v)
         found.append([way(rate, stiffness_rate, air, p) for way in (force_first_openings, two_valve_openings)])
     assert np.abs(found).max() <= 1
     return tuple(np.transpose(found, (1, 2, 0)))

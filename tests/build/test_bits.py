@@ -123,7 +123,7 @@ def test_a_law_on_cortex_m7(tmp_path, sensors):
 
 
 OPTIONS = {
-    "worn": {"valves.deadband": 0.02, "valves.hysteresis": 0.01},
+    "worn": {"valves.supply_overlap": 0.02, "valves.hysteresis": 0.01},
     "all": {
         "air.supply_conductance": 6e-9, "air.supply_volume": 2e-3, "chambers.tube_length": 1, "mechanics.mode_frequency": 30,
     },

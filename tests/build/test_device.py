@@ -86,8 +86,13 @@ def test_lanes_that_wait_begin_where_they_are_told(device):
         assert_equal(*(seen[ours] for seen, _ in outcomes))
 
 
+# One for each loop: on a device a controller is whoever gives openings, and has been hashed with the native environment.
+ROWS = reversed(fingerprints.rows().items())
+LOOPS = {(scenario, sensors, who == "residual"): row for row, (scenario, sensors, who) in ROWS}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("row", fingerprints.rows())
+@pytest.mark.parametrize("row", LOOPS.values())
 def test_the_stored_fingerprints(row, device):
     stored = json.loads(fingerprints.FILE.read_text(encoding="utf-8"))
     assert fingerprints.fingerprint(*fingerprints.rows()[row], device=device) == stored[row]

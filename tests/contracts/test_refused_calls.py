@@ -216,8 +216,8 @@ TABLE = {
         later(pullback)({name: value}) for name, value in (("air.supply_conductance", 1e-8), ("mechanics.mode_frequency", 20.0))
     ],
     ("user's own part", ""): [later(recorder)(user_force=lambda time: (0.0, 0.0))],
-    ("valves.deadband", ""): [
-        later(pullback)({"valves.deadband": 0.1}), later(recorder)(randomize={"valves.deadband": (0.01, 0.02)}),
+    ("valves.hysteresis", ""): [
+        later(pullback)({"valves.hysteresis": 0.1}), later(recorder)(randomize={"valves.hysteresis": (0.01, 0.02)}),
     ],
     **{
         (f"controller 'mine': {words}", "an array (4, 2)"): [later(checked_command, "mine")(returned, 2)]

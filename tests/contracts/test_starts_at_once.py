@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from birthsim_build.kernels.paths import PATHS
+from birthsim_env.physics.compiled import prebuilt
 
 ROOT = Path(__file__).parents[2]
 
@@ -40,7 +41,8 @@ print(json.dumps([sorted(kernels), sorted(missed), sorted(sys.modules)]))
 @pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS)
 def test_nothing_is_compiled(path, tmp_path):
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "BIRTHSIM_PREBUILT": "1"}
+    usual = {"BIRTHSIM_PREBUILT": "1", "BIRTHSIM_DEBUG": "0", "BIRTHSIM_BLOCK": str(prebuilt.LANES)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), **usual}
     line = [sys.executable, "-c", PROGRAM, path, str(tmp_path)]
     done = subprocess.run(line, env=environment, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-3000:]

@@ -17,6 +17,8 @@ from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
 PERIOD = 1e-3
+AIR = np.full((4, 1), 4e5)
+"""Pa: of the chambers."""
 
 
 def rubbing(coulomb):
@@ -51,7 +53,7 @@ def test_level_and_offset_of_friction_are_told_apart_by_sliding_both_ways():
         drag = np.full((2, 1), coulomb * np.sign(speed))
         left = -(level * drag + offset)
         joints = np.array([[0.0], [0.0], [speed], [speed]])
-        friction_level.learn(friction, drag, Joints(joints), left, 4.0, assumed, fresh)
+        friction_level.learn(friction, drag, Joints(joints), AIR, left, 4.0, assumed, fresh)
         fresh[:] = 0.0
     # While u is between +-SLIDING and +-1 it is not yet what the force is: the level ends within the mean of 1/u.
     np.testing.assert_allclose(friction.level, level, rtol=0.02)
@@ -62,7 +64,7 @@ def test_nothing_is_learned_of_a_piston_that_is_stuck():
     friction, fresh, drag = Friction(np.zeros((Friction.size, 1))), np.ones(1), np.full((2, 1), 12.0)
     assumed, still = rubbing(12.0), Joints(np.zeros((Joints.size, 1)))
     for _ in range(1000):
-        friction_level.learn(friction, drag, still, np.zeros((2, 1)), 4.0, assumed, fresh)
+        friction_level.learn(friction, drag, still, AIR, np.zeros((2, 1)), 4.0, assumed, fresh)
         fresh[:] = 0.0
     np.testing.assert_array_equal(friction.level, 1.0)
 
@@ -139,7 +141,7 @@ def test_the_hand_is_found_from_what_the_force_balance_leaves(slides):
         # Unknown friction is what the fraction leaves out of the believed one.
         left -= force_observer.FRICTION_FRACTION * np.array([p.fc1, p.fc2]) * np.sign(moved)
         joints = np.array([*y, moved, moved])[:, None]
-        force_observer.observe(found, np.array([k * PERIOD]), Joints(joints), left[:, None], p, PERIOD, fresh)
+        force_observer.observe(found, np.array([k * PERIOD]), Joints(joints), AIR, left[:, None], p, PERIOD, fresh)
         fresh[:] = 0.0
     # The low-pass has had 40 time constants; J changes by 1 % of itself in one of them while the pistons slide.
     np.testing.assert_allclose(found.force[:, 0], hand, rtol=0.01)

@@ -31,11 +31,18 @@ def piston(time, force):
     return found.y[0]
 
 
+def filter_of(level):
+    """A filter of pistons with a level of Coulomb friction, N."""
+    b = Bristled(np.zeros((Bristled.size, 1)))
+    b.level[:] = level
+    return b
+
+
 def found(load, push, seconds, seed):
     """Force, N, that the filter finds at each period where chambers push with ``load(t)`` and a hand with ``push(t)``."""
     time = np.arange(round(seconds / PERIOD)) * PERIOD
     path, rng = piston(time, lambda t: load(t) + push(t)), np.random.default_rng(seed)
-    b, forces = Bristled(np.zeros((Bristled.size, 1))), np.empty(len(time))
+    b, forces = filter_of(COULOMB), np.empty(len(time))
     bristle_filter.begin(b, 1, 0, path[0], 0.0, 0.0, NOISE, P)
     for k, t in enumerate(time):
         bristle_filter.predict(b, 1, 0, load(t - PERIOD / 2), 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, P, PERIOD)
@@ -65,7 +72,7 @@ def test_a_hand_that_makes_the_piston_slide_is_found_beyond_its_friction():
 
 def believed(state, covariance):
     """A filter of piston 2 with a ``state`` y, v, z, f, and its ``covariance`` (4, 4)."""
-    b = Bristled(np.zeros((Bristled.size, 1)))
+    b = filter_of(COULOMB)
     b.position[1], b.speed[1], b.bristle[1], b.push[1] = state
     b.surprise[1] = 1.0
     for name, (i, j) in zip(COVARIANCE, zip(*np.triu_indices(4), strict=True), strict=True):
@@ -118,7 +125,7 @@ def test_a_speed_that_is_not_known_wears_bristles_down():
 
 def test_a_piston_without_friction_is_followed():
     p = Rig(parameter_column(RIG.replace({"cylinder2.coulomb_friction": 0.0})))
-    b = Bristled(np.zeros((Bristled.size, 1)))
+    b = filter_of(0.0)
     bristle_filter.begin(b, 1, 0, 0.0, 0.0, 0.0, NOISE, p)
     position, speed = 0.0, 0.0
     for k in range(500):

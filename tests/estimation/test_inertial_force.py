@@ -61,7 +61,8 @@ def test_while_pistons_slide_it_is_what_newtons_law_asks_for(v1, v2):
     # The instant is late, so that nothing is tared.
     hand, lane = np.array([23.0, -17.0]), Observed(RIG, 3.0)
     start, speed = np.array([0.01, -0.02]), np.array([v1, v2])
-    coulomb, static, viscous = (np.array([getattr(P, f"{name}{k}") for k in (1, 2)]) for name in ("fc", "fs", "fv"))
+    coulomb, viscous = (np.array([getattr(P, f"{name}{k}") for k in (1, 2)]) for name in ("fc", "fv"))
+    static = P.static_ratio * coulomb
     drag = np.sign(speed) * (coulomb + (static - coulomb) / (1 + (speed / P.stribeck) ** 2)) + viscous * speed
 
     def place(time):

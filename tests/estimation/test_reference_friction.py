@@ -20,18 +20,19 @@ RIG, RATE = Parameters(), 2.5
 class Friction:
     """The kernels with the bristles that a stage keeps for them, over N lanes."""
 
-    def __init__(self, lanes: int = 1, rig: Parameters = RIG) -> None:
+    def __init__(self, lanes: int = 1, rig: Parameters = RIG, gauge: float = 0.0) -> None:
         self._p, self._period, self.bristles = Rig(parameter_column(rig)), rig.electronics.control_period, np.zeros((2, lanes))
+        self._pressures = np.full((4, lanes), rig.air.atmospheric_pressure + gauge)
 
     def update(self, motion: Array) -> Array:
         drag = np.empty_like(self.bristles)
-        reference_friction.update_bristle(Motion(motion), self._p, self._period, self.bristles, drag)
+        reference_friction.update_bristle(Motion(motion), self._pressures, self._p, self._period, self.bristles, drag)
         return drag
 
     def forecast(self, ahead: Array, ticks: Array) -> Array:
         lanes, steps = self.bristles.shape[1], self._period * np.diff(ticks, prepend=0)
         drag = np.empty((2 * len(ticks), lanes))
-        reference_friction.forecast(ahead.reshape(-1, lanes), self._p, steps, self.bristles.copy(), drag)
+        reference_friction.forecast(ahead.reshape(-1, lanes), self._pressures, self._p, steps, self.bristles.copy(), drag)
         return drag.reshape(-1, 2, lanes)
 
 
@@ -105,6 +106,20 @@ def test_steady_motion_feels_the_stribeck_curve_whatever_the_step(period: float,
         got = drags(rig, times, straight)
         assert got[-1, 1] == pytest.approx(sign * level, rel=1e-3)
         assert np.abs(got[:, 1]).max() <= level * (1 + 1e-12), "never more"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_pressed_seal_is_believed_to_rub_as_it_does(sign: float) -> None:
+    """Both chambers 3 bar above the atmosphere: 6 + 6 times 0.5 N/bar, a tenth more outwards than in the mean."""
+    changes = {"coulomb_friction": 6.0, "pressure_friction": 5e-6, "direction_asymmetry": 0.1}
+    model = Friction(rig=RIG.replace({f"cylinder2.{name}": value for name, value in changes.items()}), gauge=3e5)
+    for k in range(200):
+        y = 0.5 + sign * 0.4 * (1e-3 * k - 0.1)
+        drag = model.update(np.array([[y], [0.0], [sign * 0.4], [0.0], [0.0], [0.0], [0.0], [0.0]]))
+    level = (
+        9.0 * (1.0 + 0.1 * sign) * (1.0 + (RIG.friction.static_ratio - 1.0) / (1.0 + (0.4 / RIG.friction.stribeck_speed) ** 2))
+    )
+    assert drag[1, 0] == pytest.approx(sign * level, rel=1e-6)
 
 
 def two_lanes(times: Array) -> Array:

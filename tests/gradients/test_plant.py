@@ -41,6 +41,8 @@ def test_taped_and_tangent_steps_have_the_bits_of_the_plant() -> None:
 def test_gradients_are_differences_on_drawn_rigs() -> None:
     """1000 states far from rest over 10 ms: 99 % within 1e-6; the rest is on a kink, and within it of a smaller difference."""
     plant, opening, force = plant_of(1000, 3)
+    plant.lane_parameters[[at.FP1, at.FP2], ::2] = 6e-6
+    plant.lane_parameters[[at.ASYMMETRY1, at.ASYMMETRY2], ::3] = 0.2
     state, rig = plant.state.copy(), plant.lane_parameters.copy()
     way, weight = along(1000, rig, 1, 4), np.random.default_rng(5).standard_normal((18, 1000)) / SCALES
     assert way.rig is not None

@@ -172,10 +172,13 @@ def orifice(conductance: float, p_from: float, p_to: float, rig: Parameters) -> 
 
 
 def net_flow(opening: float, pressure: float, rig: Parameters) -> float:
-    """Into a chamber: through the orifices to the supply and to the atmosphere, both leaking, kg/s."""
-    c, leak = rig.valves.sonic_conductance, rig.valves.leakage_ratio
-    supplied = orifice(c * (max(opening, 0.0) + leak), rig.air.supply_pressure, pressure, rig)
-    return supplied - orifice(c * (max(-opening, 0.0) + leak), pressure, rig.air.atmospheric_pressure, rig)
+    """Into a chamber whose valve has the curve that all share: through both orifices, which leak, kg/s."""
+    v = rig.valves
+    to_supply = second_model.opened(opening, np.array([v.supply_overlap, v.supply_curvature, 1.0]))
+    to_exhaust = second_model.opened(-opening, np.array([v.exhaust_overlap, v.exhaust_curvature, v.exhaust_ratio]))
+    supplied = orifice(v.sonic_conductance * (to_supply + v.leakage_ratio), rig.air.supply_pressure, pressure, rig)
+    leaving = v.sonic_conductance * (to_exhaust + v.leakage_ratio)
+    return supplied - orifice(leaving, pressure, rig.air.atmospheric_pressure, rig)
 
 
 def opening_for(flow: float, pressure: float, rig: Parameters) -> float:

@@ -22,6 +22,7 @@ from lab.studies.speed import twin
 
 ELSEWHERE = {
     "mechanics.impact_speed": "an episode reports impacts, which the plant only measures",
+    "valves.crossing": "whoever inverts the characteristic crosses the overlap over it",
     "air.polytropic_index": "the control model's, with which controllers and starts compute",
 }
 """Parameters of the plant's sections that move nothing, and who uses them."""

@@ -14,7 +14,7 @@ from birthsim_env.parts.drawn.randomization import documented_ranges, draw_param
 from birthsim_env.parts.drawn.seeding import STREAMS, lane_seeds, stream
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_column
-from birthsim_env.physics.rig.parameters import value_of
+from birthsim_env.physics.rig.parameters import DECLARED, value_of
 from birthsim_env.physics.rig.rows import RIG_ROWS, parameters_read
 from birthsim_env.registry import names
 
@@ -68,6 +68,18 @@ def test_other_random_parts_do_not_move_reference_stiffness_and_force(scenario, 
     np.testing.assert_array_equal(changed[3], world(randomize=True)[3])
 
 
+def test_a_logarithmic_range_is_filled_over_its_decades():
+    """Bristles: a tenth to ten times 5e4 N/m, each tenth of the two decades alike, and lanes have what a single rig draws."""
+    name, (low, high) = "friction.bristle_stiffness", DECLARED["friction.bristle_stiffness"].range
+    drawn = rigs(randomize={name: (low, high)})["s0"]
+    assert low <= drawn.min() < 1.01 * low
+    assert 0.99 * high < drawn.max() <= high
+    counts = np.histogram(np.log10(drawn), 10, (np.log10(low), np.log10(high)))[0]
+    assert np.abs(counts - 150).max() < 4.5 * np.sqrt(150 * 0.9)
+    one = draw_parameters(Parameters(), {name: (low, high)}, np.random.default_rng(3)).friction.bristle_stiffness
+    assert one == pytest.approx(low * (high / low) ** np.random.default_rng(3).uniform(), rel=1e-14)
+
+
 @pytest.mark.parametrize("name", names("scenario"))
 def test_without_randomization_every_seed_gives_the_same_fixed_experiment(name):
     one, other = (world(environment_id(name), seed=seed, lanes=6) for seed in (0, 100))
@@ -89,9 +101,7 @@ def test_draws_stay_inside_their_ranges_and_fill_them_independently():
         correlation = np.corrcoef(drawn[COLUMNS[one]], drawn[COLUMNS[other]])[0, 1]
         assert abs(correlation) < 4.5 / np.sqrt(1500), (one, other)
     nominal = dict(zip(PARAMETER_NAMES, parameter_column(Parameters()), strict=True))
-    # Static friction follows the Coulomb level by a fixed ratio; all else keeps its nominal value.
-    np.testing.assert_allclose(drawn["fs1"], 1.33 * drawn["fc1"])
-    np.testing.assert_allclose(drawn["fs2"], 1.33 * drawn["fc2"])
+    # What is not drawn, nor derived from it, keeps its nominal value.
     np.testing.assert_array_equal(drawn["spool_rate"], 1 / drawn["tau"])
     np.testing.assert_array_equal(drawn["inverse_mass"], 1 / drawn["mass"])
     for name in (name for name in PARAMETER_NAMES if not READ[name] & DRAWN.keys()):

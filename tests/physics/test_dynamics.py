@@ -12,7 +12,7 @@ from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.accuracy import second_model
 from lab.studies.accuracy.second_model import SecondModel
-from tests.physics.rigs import DEMANDING, LAWS, MOVED, OTHER
+from tests.physics.rigs import DEMANDING, LAWS, MOVED, OTHER, PRESSED, UNLIKE
 
 
 def anywhere(rig: Parameters, lanes: int, seed: int) -> tuple[Plant, Array, Array]:
@@ -43,7 +43,11 @@ def other_rates(rig: Parameters, plant: Plant, state: Array, command: Array, pus
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("changes", [MOVED, OTHER, DEMANDING], ids=["moved", "other", "demanding"])
+@pytest.mark.parametrize(
+    "changes",
+    [MOVED, OTHER, DEMANDING, UNLIKE, PRESSED],
+    ids=["moved", "other", "demanding", "unlike valves", "pressed"],
+)
 def test_rates_are_the_second_models(changes: dict[str, object], law: str) -> None:
     """Its own rates at a state are the slope of its coordinates along the plant's rates."""
     rig = Parameters().replace({**changes, "friction.law": law})

@@ -9,7 +9,7 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import rigid_body
-from tests.physics.rigs import LAWS, MOVED
+from tests.physics.rigs import LAWS, MOVED, PRESSED
 from tests.physics.test_mechanics import bore_force
 
 LANES = 30
@@ -23,11 +23,12 @@ def situation(rig: Parameters, seed: int) -> tuple[Array, Array]:
     return 0.7 * half * rng.uniform(-1, 1, (2, LANES)), rng.choice([0.0, 0.004, -0.004, 0.3, -0.3], (2, LANES))
 
 
-def friction(rig: Parameters, speed: Array) -> Array:
-    """Friction of steady sliding, N, (2, N); none at rest."""
+def friction(rig: Parameters, speed: Array, pressures: Array) -> Array:
+    """Friction of steady sliding, N, (2, N), between chambers at ``pressures`` (4, N), Pa; none at rest."""
     rows = []
-    for cylinder, v in zip((rig.cylinder1, rig.cylinder2), speed, strict=True):
-        level = cylinder.coulomb_friction * np.ones_like(v)
+    for k, (cylinder, v) in enumerate(zip((rig.cylinder1, rig.cylinder2), speed, strict=True)):
+        pressed = cylinder.pressure_friction * (pressures[2 * k : 2 * k + 2] - rig.air.atmospheric_pressure).sum(axis=0)
+        level = (cylinder.coulomb_friction + pressed) * (1 + cylinder.direction_asymmetry * np.sign(v))
         if rig.friction.law != "coulomb":
             level = level * (1 + (rig.friction.static_ratio - 1) / (1 + (v / rig.friction.stribeck_speed) ** 2))
         rows.append(np.sign(v) * level + cylinder.viscous_friction * v)
@@ -35,9 +36,10 @@ def friction(rig: Parameters, speed: Array) -> Array:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_forces_balance_at_rest_and_in_motion(law: str) -> None:
+@pytest.mark.parametrize("changes", [MOVED, {**MOVED, **PRESSED}], ids=["moved", "pressed"])
+def test_forces_balance_at_rest_and_in_motion(changes: dict[str, object], law: str) -> None:
     """Pressures carry weight, by virtual work, and the friction of steady sliding, at the stiffness (9) asked for."""
-    rig = Parameters().replace({**MOVED, "friction.law": law})
+    rig = Parameters().replace({**changes, "friction.law": law})
     plant, (piston, speed) = Plant(rig, LANES), situation(rig, 1)
     asked = np.random.default_rng(2).uniform([[3600], [2500]], [[4400], [3200]], (2, LANES))
     s = balanced_state(plant.lane_parameters, piston, speed, asked)
@@ -49,17 +51,18 @@ def test_forces_balance_at_rest_and_in_motion(law: str) -> None:
     carried = -(rigid_body.jacobians(piston, rig).transpose(0, 2, 1) @ weight).T
     inside = np.all((s[list(at.PRESSURES)] > 1.1e5) & (s[list(at.PRESSURES)] < 6.9e5), axis=0)
     assert inside.sum() > LANES / 3
+    rubbed = friction(rig, speed, s[list(at.PRESSURES)])
     for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
         pp, pn = s[CHAMBERS[i][0]], s[CHAMBERS[i][1]]
         pushed = bore_force(cylinder, pp, pn, rig.air.atmospheric_pressure)
-        np.testing.assert_allclose(pushed, carried[i] + friction(rig, speed)[i], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(pushed, carried[i] + rubbed[i], rtol=0, atol=1e-9)
         length_p, length_n = cylinder.stroke / 2 + piston[i], cylinder.stroke / 2 - piston[i]
         stiffness = rig.air.polytropic_index * (pp * cylinder.area_p / length_p + pn * cylinder.area_n / length_n)
         np.testing.assert_allclose(stiffness[inside], asked[i, inside], rtol=1e-12)
         if law == "coulomb":
             np.testing.assert_array_equal(s[at.Z1 + i], 0.0)
         else:
-            dry = friction(rig, speed)[i] - cylinder.viscous_friction * speed[i]
+            dry = rubbed[i] - cylinder.viscous_friction * speed[i]
             np.testing.assert_allclose(s[at.Z1 + i], dry / rig.friction.bristle_stiffness, rtol=1e-12)
 
 

@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from birthsim_env.physics import friction
+from birthsim_env.physics import dynamics, friction
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y2, Z1, Z2
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -105,6 +105,27 @@ def test_steady_friction_takes_energy_at_every_speed(v: float, cylinder: int) ->
     assert lugre * v >= least
     assert coulomb * v >= least
     assert v == 0 or lugre * v > least
+
+
+@given(law=st.sampled_from(LAWS), v=st.floats(0.002, 0.3), bar=st.floats(0, 6), way=st.sampled_from([1, -1]))
+@settings(max_examples=20)
+def test_a_seal_rubs_by_the_pressures_and_the_way(law: str, v: float, bar: float, way: int) -> None:
+    """Sliding at a constant speed: (3 N + 0.6 N/bar (p + 2 bar)) (1 +- 0.2) by G(v)/Fc, and Fv v."""
+    changes = {"coulomb_friction": 3.0, "pressure_friction": 6e-6, "direction_asymmetry": 0.2}
+    rig = Parameters().replace({**{f"cylinder2.{name}": value for name, value in changes.items()}, "friction.law": law})
+    level = (3.0 + 0.6 * (bar + 2.0)) * (1.2 if way > 0 else 0.8)
+    steady = level if law == "coulomb" else level * (1.0 + 0.33 / (1.0 + (v / VS) ** 2))
+    plant, air = Plant(rig), rig.air.atmospheric_pressure
+    plant.state[[PRESSURES[2], PRESSURES[3], V2, Z2]] = [[air + 1e5 * bar], [air + 2e5], [way * v], [way * steady / S0]]
+    force, rate = dynamics.piston_friction(plant.state, plant.lane_parameters, 0, 1)
+    assert force == pytest.approx(way * (steady + FV * v), rel=1e-12)
+    assert rate == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_level_below_zero_is_none() -> None:
+    """Suction of 0.6 bar on a seal that only pressure makes rub."""
+    assert friction.pressed_level(0.0, 9e-6, 0.7e5, 0.7e5, 1e5) == 0.0
+    assert friction.pressed_level(1.0, 9e-6, 0.7e5, 0.7e5, 1e5) == pytest.approx(1.0 - 9e-6 * 0.6e5)
 
 
 @bristles

@@ -14,10 +14,16 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from lab.studies.gradients.states import plant_of
 from tests.console import call, strict
-from tests.physics.rigs import OTHER
+from tests.physics.rigs import OTHER, PRESSED
 
 COULOMB = {"friction.law": "coulomb"}
-RIGS = {"default": {}, "other": OTHER, "elasto-plastic": {"friction.law": "elasto_plastic"}, "Coulomb": COULOMB}
+RIGS = {
+    "default": {},
+    "other": OTHER,
+    "pressed": PRESSED,
+    "elasto-plastic": {"friction.law": "elasto_plastic"},
+    "Coulomb": COULOMB,
+}
 SCALES = np.array([*[0.1] * 4, *[1e-4] * 2, *[1e5, 300.0] * 4, *[1.0] * 8, 10.0, 10.0])
 """Size of each state, opening and force."""
 STEP = np.finfo(float).eps ** (1 / 3)

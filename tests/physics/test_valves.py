@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env.physics import valves
+from birthsim_env.physics import air, valves
+from birthsim_env.physics.characteristic import Edge
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, TEMPERATURES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -14,6 +15,13 @@ from lab.studies.accuracy import second_model
 C, B, CL = 3.9e-9, 0.30, 0.005 * 3.9e-9
 RHO0, T0, SUPPLY, ATMOSPHERE = 1.185, 293.15, 7.0e5, 1.013e5
 """Assumed: sonic conductance, critical ratio, leakage; ISO 6358 reference state; absolute pressures."""
+VALVE = valves.Valve(Edge(0.0, 1.0, 0.0), Edge(0.0, 1.0, 0.0), C, CL, 0.03)
+"""Linear, as that of the default rig."""
+CURVED = {
+    **{"valves.supply_overlap": 0.1, "valves.supply_curvature": 0.4, "valves.exhaust_overlap": 0.04},
+    **{"valves.exhaust_curvature": -0.3, "valves.exhaust_ratio": 0.7, "valve_n1.supply_overlap": 0.05},
+}
+"""Edges that differ, so that one begins to open before the other where a cylinder has one valve."""
 
 
 def both_ways(conductance: float, pa: float, ta: float, pb: float, tb: float) -> float:
@@ -65,7 +73,7 @@ warmth = st.floats(230, 400)
 @given(pressure=inside, temperature=warmth, spool=st.floats(-1, 1))
 def test_opening_for_flow_inverts_the_plants_net_flow(pressure: float, temperature: float, spool: float) -> None:
     supplied, exhausted = plant_flows(np.array([pressure]), np.array([temperature]), np.array([spool]))
-    opening = valves.opening_for_flow(supplied[0] - exhausted[0], *per_conductance(pressure, temperature), C, CL)
+    opening = valves.opening_for_flow(supplied[0] - exhausted[0], *per_conductance(pressure, temperature), VALVE)
     assert opening == pytest.approx(spool, abs=1e-12)
 
 
@@ -75,7 +83,7 @@ def test_opening_for_flow_saturates_beyond_full_opening_only(pressure: float, te
     supplied, exhausted = plant_flows(*full)
     least, most = supplied - exhausted
     wanted = wish * max(-least, most)
-    opening = valves.opening_for_flow(wanted, *per_conductance(pressure, temperature), C, CL)
+    opening = valves.opening_for_flow(wanted, *per_conductance(pressure, temperature), VALVE)
     assert -1 <= opening <= 1
     if wanted > most:
         assert opening == 1
@@ -89,9 +97,9 @@ def test_opening_for_flow_saturates_beyond_full_opening_only(pressure: float, te
 def test_valve_stays_shut_where_opening_would_let_air_run_the_other_way() -> None:
     shut = ((SUPPLY, 1e-4, 0.0), (8e5, 1e-4, 0.0), (ATMOSPHERE, -1e-4, 0.0), (0.9e5, -1e-4, 0.0))
     for pressure, wanted, expected in (*shut, (6.9e5, 1e-2, 1.0)):
-        assert valves.opening_for_flow(wanted, *per_conductance(pressure, T0), C, CL) == expected
+        assert valves.opening_for_flow(wanted, *per_conductance(pressure, T0), VALVE) == expected
     fill, drain = per_conductance(3e5, T0)
-    assert valves.opening_for_flow(CL * (fill - drain), fill, drain, C, CL) == 0, "what leaks anyway needs no opening"
+    assert valves.opening_for_flow(CL * (fill - drain), fill, drain, VALVE) == 0, "what leaks anyway needs no opening"
 
 
 fractions = st.floats(0.5, 8.0)
@@ -104,7 +112,7 @@ def test_opening_for_active_flow_inverts_one_valve_per_cylinder(
     supplied, exhausted = plant_flows(np.array([pp, pn]), np.array([tp, tn]), np.array([spool, -spool]))
     flow_p, flow_n = supplied - exhausted
     active = fraction_p * flow_p - fraction_n * flow_n
-    at = (*per_conductance(pp, tp), *per_conductance(pn, tn), fraction_p, fraction_n, C, CL)
+    at = (*per_conductance(pp, tp), *per_conductance(pn, tn), fraction_p, fraction_n, VALVE, VALVE)
     assert valves.opening_for_active_flow(active, *at) == pytest.approx(spool, abs=1e-12)
     most, least = (
         fraction_p * (q[0][0] - q[1][0]) - fraction_n * (q[0][1] - q[1][1])
@@ -116,7 +124,35 @@ def test_opening_for_active_flow_inverts_one_valve_per_cylinder(
 
 def test_a_valve_opens_however_small_the_driving_pressure() -> None:
     """A twentieth of a Pa kg/m3 drives 1e-10 kg/s at an opening of a half; only without any the valve stays shut."""
-    assert valves.opening_for(1e-10, 0.05, 1.0, 3.9e-9) == pytest.approx(1e-10 / (3.9e-9 * 0.05))
-    assert valves.opening_for(-1e-10, 1.0, 0.05, 3.9e-9) == pytest.approx(-1e-10 / (3.9e-9 * 0.05))
-    assert valves.opening_for(1e-10, 0.0, 1.0, 3.9e-9) == 0.0
-    assert valves.opening_for(-1e-10, 1.0, -0.05, 3.9e-9) == 0.0
+    tight = VALVE._replace(leakage=0.0)
+    assert valves.opening_for_flow(1e-10, 0.05, 1.0, tight) == pytest.approx(1e-10 / (C * 0.05))
+    assert valves.opening_for_flow(-1e-10, 1.0, 0.05, tight) == pytest.approx(-1e-10 / (C * 0.05))
+    assert valves.opening_for_flow(1e-10, 0.0, 1.0, tight) == 0.0
+    assert valves.opening_for_flow(-1e-10, 1.0, -0.05, tight) == 0.0
+
+
+@given(pp=inside, pn=inside, tp=warmth, tn=warmth, fraction_p=fractions, fraction_n=fractions, spool=st.floats(-1, 1))
+def test_openings_invert_the_flows_of_valves_with_a_curve(
+    pp: float, pn: float, tp: float, tn: float, fraction_p: float, fraction_n: float, spool: float
+) -> None:
+    """By the plant's flows: exactly where the overlap is behind, and within the part that crosses it before."""
+    plant = Plant(Parameters().replace(CURVED))
+    plant.state[list(PRESSURES), 0], plant.state[list(TEMPERATURES), 0] = [pp, pn, pp, pn], [tp, tn, tp, tn]
+    at_p, at_n = per_conductance(pp, tp), per_conductance(pn, tn)
+    full = C * max(fraction_p * max(at_p), fraction_n * max(at_n))
+    valve_p, valve_n = (air.valve_of(plant.lane_parameters, 0, k) for k in (0, 1))
+
+    def flows(opening: float, other: float) -> Array:
+        plant.state[list(SPOOLS), 0] = [opening, other, opening, other]
+        supplied, exhausted = plant.mass_flows()[:2, 0], plant.mass_flows()[4:6, 0]
+        return np.asarray(supplied - exhausted)
+
+    alone = flows(spool, spool)
+    both = [valves.opening_for_flow(q, *a, v) for q, a, v in zip(alone, (at_p, at_n), (valve_p, valve_n), strict=True)]
+    assert flows(*both) == pytest.approx(alone, abs=0.031 * C * max(*at_p, *at_n))
+    weights = np.array([fraction_p, -fraction_n])
+    active = float(weights @ flows(spool, -spool))
+    opened = valves.opening_for_active_flow(active, *at_p, *at_n, fraction_p, fraction_n, valve_p, valve_n)
+    assert weights @ flows(opened, -opened) == pytest.approx(active, abs=0.031 * 2 * full)
+    if abs(spool) > 0.5:
+        assert [*both, opened] == pytest.approx([spool] * 3, abs=1e-9)

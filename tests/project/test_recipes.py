@@ -40,7 +40,7 @@ ADDED = {
         12,
         (("-m", "birthsim", "evaluate", "--help"), ("-m", "birthsim", "run", "--controller", "adcr", "--out", "x")),
     ),
-    "sensor": Recipe("encoder", CONTRACTS[:1], 12, (("-m", "birthsim", "run", "--sensors", "no", "--out", "x"),)),
+    "sensor": Recipe("camera", CONTRACTS[:1], 12, (("-m", "birthsim", "run", "--sensors", "no", "--out", "x"),)),
     "scenario": Recipe("crowning", ("tests/contracts/test_environments.py",), 2),
     "parameter": Recipe("seal_friction", ("tests/oracles/test_completeness.py",), 1),
     "study": Recipe("lab-sensors", said=(("-m", "birthsim", "study", "--help"),)),

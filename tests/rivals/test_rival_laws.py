@@ -86,7 +86,7 @@ def test_pressure_setpoints_give_force_and_pneumatic_stiffness() -> None:
     y, stiffness = rng.uniform(-0.08, 0.08, 400), rng.uniform(1500, 6500, 400)
     force, index = rng.uniform(low * ap - high * an, high * ap - low * an, 400), rig.air.polytropic_index
     both = [
-        pid.pressure_setpoints.py_func(f, k, CylinderAir(low, low, ap, an, 0.1 + at, 0.1 - at, 0.0), index, low, high)
+        pid.pressure_setpoints.py_func(f, k, CylinderAir(0, low, low, ap, an, 0.1 + at, 0.1 - at, 0.0), index, low, high)
         for f, k, at in zip(force, stiffness, y, strict=True)
     ]
     set_p, set_n = np.array(both).T

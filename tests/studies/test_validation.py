@@ -20,8 +20,7 @@ def write_seals(data, seal="PK", seconds=8.0):
     speed = 0.01 * np.sin(2 * np.pi * time / 4.0)
     place = -0.01 * 4.0 / (2 * np.pi) * np.cos(2 * np.pi * time / 4.0)
     for bar in seals.BARS:
-        found = np.empty(len(time))
-        seals.driven(np.stack([speed, np.full_like(time, bar), time]), TRUE, True, found)
+        found = seals.driven(np.stack([speed, np.full_like(time, bar), time]), TRUE)
         force = 1e5 * seals.AREA * bar + found + OFFSET
         rows = np.column_stack([1e3 * time, 1e3 * place, np.full_like(time, bar), force])
         head = "time_ms,laser_mm,pressure_bar_gauge,force_N"
@@ -57,8 +56,7 @@ def test_the_level_and_its_growth_with_pressure_are_found(tmp_path):
 def test_a_driven_piston_has_the_friction_of_lugres_equations():
     time = np.arange(0, 1.0, seals.PERIOD)
     moved = np.stack([0.014 * np.sin(2 * np.pi * time), 1.0 + time, np.zeros_like(time)])
-    found = np.empty(len(time))
-    seals.driven(moved, TRUE, True, found)
+    found = seals.driven(moved, TRUE)
     f0, per_bar, ratio, stribeck, stiffness, viscous = TRUE
     deflection, expected = 0.0, []
     for speed, pressure, _ in moved.T:

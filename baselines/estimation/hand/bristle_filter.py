@@ -9,6 +9,7 @@ creeps under its noise; here the model alone moves the bristles at rest.
 
 import math
 
+from baselines.estimation import dry_friction
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
@@ -56,13 +57,15 @@ class Bristled(Rows):
     ff = rows("ff1 ff2", "N2", "covariance")
     stirred = rows("s1 s2", "1", "squared innovations of the force over their variance, averaged")
     surprise = rows("e1 e2", "1", "squared innovations over their variance, averaged")
+    level = rows("Fc1 Fc2", "N", "Coulomb friction at the pressures of the chambers, but for the way of motion")
 
 
 @helper
-def _slack(speed: float, coulomb: float, static: float, p: Rig) -> float:
-    """Deflection, m, at which a sliding piston's bristles stay."""
-    level: float = max(friction.stribeck_level(speed, coulomb, static, p.stribeck), LEAST_FRICTION) / p.s0
-    return level
+def _slack(k: int, speed: float, level: float, p: Rig) -> float:
+    """Deflection, m, at which the bristles of sliding piston ``k`` stay, at the ``level`` of its pressures."""
+    coulomb = dry_friction.level_along(k, speed, level, p)
+    slack: float = max(friction.stribeck_level(speed, coulomb, p.static_ratio * coulomb, p.stribeck), LEAST_FRICTION) / p.s0
+    return slack
 
 
 @helper
@@ -80,14 +83,13 @@ def _wear(speed: float, variance: float) -> float:
 @helper
 def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: float, noise: float, p: Rig) -> None:
     """Starts piston ``k`` of lane ``i`` at a measured ``position`` with a ``speed``, where friction and ``push``, N, balance
-    the rest."""
-    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
+    the rest; its ``level`` is there already."""
     b.position[k, i], b.speed[k, i] = position, speed
-    b.bristle[k, i] = _slack(speed, coulomb, static, p) * speed / (abs(speed) + SLIDES)
+    b.bristle[k, i] = _slack(k, speed, b.level[k, i], p) * speed / (abs(speed) + SLIDES)
     b.push[k, i] = push + p.s0 * b.bristle[k, i]
     b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i] = noise * noise, 0.0, 0.0, 0.0
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = 0.0, 0.0, 0.0
-    bent = min(FIRST_BRISTLE, p.fc1 if k == 0 else p.fc2) / p.s0
+    bent = min(FIRST_BRISTLE, b.level[k, i]) / p.s0
     b.zz[k, i], b.zf[k, i], b.ff[k, i] = bent * bent, 0.0, FIRST_PUSH * FIRST_PUSH
     b.surprise[k, i] = 1.0
 
@@ -99,18 +101,19 @@ def predict(
     """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
     forces; ``answer``, 1/kg, to a force; ``push_noise``, N2/s, that drives f; ``unseen``, the part of the variance of v that is
     motion, which wears bristles down, rather than ignorance of a piston that rests."""
-    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
-    viscous = p.fv1 if k == 0 else p.fv2
-    most = max(static, LEAST_FRICTION) / p.s0
-    v, z = b.speed[k, i], max(-most, min(most, b.bristle[k, i]))
-    slack, fast = _slack(v, coulomb, static, p), _wear(v, unseen * b.vv[k, i])
+    viscous, level = (p.fv1 if k == 0 else p.fv2), b.level[k, i]
+    outwards, inwards = dry_friction.level_along(k, 1.0, level, p), dry_friction.level_along(k, -1.0, level, p)
+    most = max(p.static_ratio * outwards, LEAST_FRICTION) / p.s0
+    least = -max(p.static_ratio * inwards, LEAST_FRICTION) / p.s0
+    v, z = b.speed[k, i], max(least, min(most, b.bristle[k, i]))
+    slack, fast = _slack(k, v, level, p), _wear(v, unseen * b.vv[k, i])
     kept = 1.0 / (1.0 + period * fast / slack)
     bends, relaxes = kept * (1.0 - v / fast * z / slack), kept * fast / slack
     rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
     step = period * answer
     av, az, af = 1.0 - step * (viscous + p.s1 * bends), -step * (p.s0 - p.s1 * relaxes), step
     v += period * rate
-    slack, fast = _slack(v, coulomb, static, p), _wear(v, unseen * b.vv[k, i])
+    slack, fast = _slack(k, v, level, p), _wear(v, unseen * b.vv[k, i])
     kept = 1.0 / (1.0 + period * fast / slack)
     z = kept * (z + period * v)
     bend = period * kept * (1.0 - v / fast * z / slack)
@@ -176,9 +179,8 @@ def gauge(b: Bristled, k: int, i: int, speed: float, noise: float) -> None:
 @helper
 def drag(b: Bristled, k: int, i: int, p: Rig) -> float:
     """Friction of piston ``k`` of lane ``i`` as believed, N."""
-    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
     v, z = b.speed[k, i], b.bristle[k, i]
-    bends = 1.0 - _way(v) * z / _slack(v, coulomb, static, p)
+    bends = 1.0 - _way(v) * z / _slack(k, v, b.level[k, i], p)
     found: float = ((p.fv1 if k == 0 else p.fv2) + p.s1 * bends) * v + p.s0 * z
     return found
 
@@ -187,9 +189,8 @@ def drag(b: Bristled, k: int, i: int, p: Rig) -> float:
 def weigh(b: Bristled, k: int, i: int, unexplained: float, noise: float, p: Rig) -> None:
     """Takes what acceleration, weight and chambers leave unexplained of piston ``k`` of lane ``i``, N, f less friction, and
     its standard deviation, N."""
-    coulomb, static = (p.fc1, p.fs1) if k == 0 else (p.fc2, p.fs2)
     v, z = b.speed[k, i], b.bristle[k, i]
-    slack = _slack(v, coulomb, static, p)
+    slack = _slack(k, v, b.level[k, i], p)
     # Derivatives of f less friction, to v and z.
     to_v = -((p.fv1 if k == 0 else p.fv2) + p.s1 * (1.0 - _way(v) * z / slack))
     to_z = -(p.s0 - p.s1 * abs(v) / slack)

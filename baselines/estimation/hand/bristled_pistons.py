@@ -1,5 +1,6 @@
 """Both pistons of a rig under ``bristle_filter``, with what is known to act on them: chambers, weight and the turning lever."""
 
+from baselines.estimation import dry_friction
 from baselines.estimation.hand import bristle_filter
 from baselines.estimation.hand.bristle_filter import Bristled
 from birthsim_env.loop.signals import Joints, PerChamber
@@ -35,6 +36,8 @@ def carry(
     own2 = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity)
     load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
     load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere)
+    for k in range(2):
+        b.level[k, i] = dry_friction.level_at(k, air.rows, i, p)
     if new:
         bristle_filter.begin(b, 0, i, joints.position[0, i], v1, -load1 - own1 * p.mass * kappa * kappa, noise / kappa, p)
         bristle_filter.begin(b, 1, i, joints.position[1, i], v2, -load2 - own2 * p.mass, noise, p)

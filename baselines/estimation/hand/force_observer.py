@@ -10,6 +10,7 @@ mass and of the pressure cells.
 
 import math
 
+from baselines.estimation import dry_friction
 from baselines.estimation.hand import force_bias
 from birthsim_env.loop.signals import Joints, PerPiston
 from birthsim_env.physics import geometry
@@ -38,8 +39,10 @@ class Hand(Rows):
 
 
 @helper
-def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig, period: float, fresh: Array) -> None:
-    """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is R."""
+def observe(
+    hand: Hand, time: Array, joints: Joints, pressures: Array, unexplained: Array, p: Rig, period: float, fresh: Array
+) -> None:
+    """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is R, ``pressures`` (4, N), Pa, those of the chambers."""
     share, left = period / (1.0 / QUICKNESS + period), PerPiston(unexplained)
     for i in range(time.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
@@ -54,9 +57,11 @@ def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig,
         )
         new = fresh[i] > 0.0
         for cylinder in range(2):
-            most = (p.fc1 if cylinder == 0 else p.fc2) / p.s0
+            level = dry_friction.level_at(cylinder, pressures, i, p)
+            most = dry_friction.level_along(cylinder, 1.0, level, p) / p.s0
+            least = -dry_friction.level_along(cylinder, -1.0, level, p) / p.s0
             moved = joints.position[cylinder, i] - hand.before[cylinder, i]
-            bristle = 0.0 if new else max(-most, min(most, hand.bristle[cylinder, i] + moved))
+            bristle = 0.0 if new else max(least, min(most, hand.bristle[cylinder, i] + moved))
             hand.bristle[cylinder, i], hand.before[cylinder, i] = bristle, joints.position[cylinder, i]
         f1 = left.first[i] + FRICTION_FRACTION * p.s0 * hand.bristle[0, i]
         f2 = left.second[i] + FRICTION_FRACTION * p.s0 * hand.bristle[1, i]

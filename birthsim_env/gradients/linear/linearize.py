@@ -24,6 +24,7 @@ from birthsim_env.gradients.tracing import call
 from birthsim_env.physics import geometry, options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
+from birthsim_env.physics.dynamics import coulomb_level
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.mechanics import piston_force
 from birthsim_env.physics.plant import Plant, checked
@@ -163,14 +164,14 @@ def linearize(
     x[list(at.SPOOLS)] = u
     kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_RATE], 0] > 0.0)], [at.STATES, 1, 4, 8])
     has_bristle = p[at.LUGRE, 0] + p[at.ELASTO_PLASTIC, 0] > 0.5
-    level = p[[at.FS1, at.FS2] if has_bristle else [at.FC1, at.FC2], 0]
+    ratio = p[at.STATIC_RATIO, 0] if has_bristle else 1.0
     if friction == "sliding":
         # A bristle that neither moves nor damps holds dry friction where it is.
         p[at.LUGRE], p[at.ELASTO_PLASTIC], p[at.S1] = 1.0, 0.0, 0.0
     kept[[at.Z1, at.Z2]] = friction == "stuck" and has_bristle
     load = geometry.joint_force([f[0], f[1] - p[at.MASS, 0] * p[at.GRAVITY, 0]], piston, rig)
     leans = friction == "sliding" or has_bristle
-    x[[at.Z1, at.Z2]] = _left_over(x, load, p, level) / p[at.S0, 0] if leans else 0.0
+    x[[at.Z1, at.Z2]] = _left_over(x, load, p, ratio) / p[at.S0, 0] if leans else 0.0
     names = STATES
     if kept[at.STATES :].any():
         x, names = np.concatenate([x, _further(x, f, p)]), STATES + FURTHER
@@ -233,10 +234,14 @@ def _further(x: Array, f: Array, p: Array) -> Array:
     return further[:, 0]
 
 
-def _left_over(x: Array, load: Array, p: Array, level: Array) -> Array:
-    """What pressures leave of a load along the pistons (2,), N, to friction, (2,), N; refuses more than its ``level`` (2,)."""
+def _left_over(x: Array, load: Array, p: Array, ratio: float) -> Array:
+    """What pressures leave of a load along the pistons (2,), N, to friction, (2,), N; refuses more than ``ratio`` times the
+    Coulomb level of the way in which it would drive the piston."""
     areas, pressures = p[[at.AREA_P1, at.AREA_N1, at.AREA_P2, at.AREA_N2], 0], x[list(at.PRESSURES)]
     left: Array = load + call(piston_force, pressures[::2], pressures[1::2], areas[::2], areas[1::2], p[at.ATMOSPHERE, 0])
+    driven = x.copy()
+    driven[[at.V1, at.V2]] = left
+    level = ratio * np.array([call(coulomb_level, driven[:, None], p, 0, k) for k in range(2)], dtype=float)
     rounding = 1e-9 * p[at.SUPPLY, 0] * areas[::2]
     if np.any(np.abs(left) > level + rounding):
         k = int(np.argmax(np.abs(left) - level))

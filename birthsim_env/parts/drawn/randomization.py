@@ -1,4 +1,7 @@
-"""Domain randomisation of the rig: uniform draws from the ranges that parameters are declared with."""
+"""Domain randomisation of the rig: uniform draws from the ranges that parameters are declared with.
+
+Of a parameter that is known by its order of magnitude alone the logarithm is uniform.
+"""
 
 import copy
 import math
@@ -9,6 +12,7 @@ import numpy as np
 
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.sensors.model import drawn_by
+from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.consistency import least_dead_volume
@@ -118,7 +122,7 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
 
 
 def draw_parameters(nominal: Parameters, ranges: Ranges, rng: np.random.Generator) -> Parameters:
-    """``nominal`` with every field in ``ranges`` drawn uniformly, independently, in the order of the names."""
+    """``nominal`` with every field in ``ranges`` drawn, independently, in the order of the names."""
     return nominal.replace(_drawn(ranges, rng))
 
 
@@ -145,4 +149,13 @@ def draw_rig(nominal: Parameters, ranges: Ranges, streams: Streams) -> Parameter
 
 
 def _drawn(ranges: Ranges, rng: Any) -> dict[str, Any]:
-    return {name: rng.uniform(*ranges[name]) for name in sorted(ranges)}
+    return {name: _one_drawn(name, *ranges[name], rng) for name in sorted(ranges)}
+
+
+def _one_drawn(name: str, low: float, high: float, rng: Any) -> Any:
+    if not parameter_of(name).logarithmic:
+        return rng.uniform(low, high)
+    share = rng.uniform()
+    octaves = exact.number("log2", high / low)
+    powers = [exact.number("exp", octaves * one / exact.LOG2_E) for one in np.ravel(share)]
+    return np.minimum(low * np.reshape(powers, np.shape(share)), high)[()]

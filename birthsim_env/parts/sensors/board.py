@@ -4,7 +4,6 @@ The sensor models ``lab`` and ``honest`` are such boards. Parameters, their sour
 declared in ``physics.electronics``.
 """
 
-import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,6 +15,15 @@ from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.parts.sensors.noise import happens, noise_of
+from birthsim_env.parts.sensors.readings import (
+    Readings,
+    is_read,
+    seen_again,
+    sense_acceleration,
+    sense_force,
+    sense_pressures,
+    show,
+)
 from birthsim_env.parts.sensors.sensor_errors import (
     SENSOR_PARAMETERS,
     Errors,
@@ -28,30 +36,12 @@ from birthsim_env.parts.sensors.sensor_errors import (
 )
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel, over
-from birthsim_env.physics.compiled.lanes import PRESSURES, Array
-from birthsim_env.physics.compiled.records import Rows, row, rows
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.restored import Declared, Kept
 
-TRACKED, NOISE_OF_FORCE, LOST, MISSED = 4, 6, 8, 9
-"""Channels of random numbers; the pressures have the first four."""
-
-
-class Readings(Rows):
-    """What the sensors say, which stays as it is in a missed period."""
-
-    position = rows("x y", "m", "of the end effector")
-    position_time = row("s", "when the position was measured")
-    velocity = rows("vx vy", "m/s", "of the end effector")
-    pressure = rows("P1 N1 P2 N2", "Pa", "of the chambers")
-    force = rows("x y", "N", "of the hand")
-    acceleration = rows("x y", "m/s2", "of the end effector")
-
-
-@helper
-def converted(value: float, step: float, least: float, most: float) -> float:
-    """``value`` as a converter with a ``step`` tells it; a step of 0 is no converter."""
-    return max(least, min(most, exact.rounded(value, step))) if step > 0.0 else value
+TRACKED, LOST = 4, 8
+"""Channels of random numbers; ``readings`` has those of forces and of missed periods."""
 
 
 @helper
@@ -73,7 +63,7 @@ def _growth(e: Errors, shared: Shared, i: int, x: float, y: float) -> float:
 
 
 @helper
-def _track(
+def track(
     world: World, time: float, shared: Shared, e: Errors, queue: Array, arrived: tracker.Arrived, key: np.uint64, i: int
 ) -> None:
     """Take a sample where it is due, and let arrive what is under way in the ``queue`` (Q, 3, N)."""
@@ -88,7 +78,16 @@ def _track(
         if tick == 0:
             speed = world.motion.velocity
             tracker.start(queue, arrived, i, at_x, at_y, speed[0, i], speed[1, i])
-    tracker.arrive(queue, arrived, i, time, e.parameters.position_latency[i])
+    tracker.arrive(queue, arrived, i, time, e.parameters.position_latency[i], tracker.RATE_TIME)
+
+
+@helper
+def read_tracker(seen: Seen, readings: Readings, arrived: tracker.Arrived, e: Errors, shared: Shared, i: int) -> None:
+    """Take over what has arrived of the tracker's."""
+    stamp = arrived.time[i] + (e.parameters.position_latency[i] - shared.stamped)
+    readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
+    for axis in range(2):
+        readings.position[axis, i], readings.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
 
 
 @kernel
@@ -98,56 +97,16 @@ def _look(world: World, seen: Seen, memory: int, shared: Shared, tables: int, la
     keys, e, queue = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine]
     arrived, own = tracker.Arrived(table2(tables, 3)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine])
     passed, late, readings = table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine], Readings(table2(tables, 6)[:, mine])
-    slots = late.shape[0]
     for i in range(n):
         tick, key = int(world.tick[i]), keys[i]
-        _track(world, seen.time[i], shared, e, queue, arrived, key, i)
-        whole = math.floor(e.delay[i] + 1e-9)
-        rest = max(0.0, e.delay[i] - whole)
-        newest, earlier = tick - int(whole), tick - int(whole) - 1
-        # Where other lanes begin anew, all are looked at once more in the same period.
-        again = tick > 0 and own.tick[i] == tick
-        own.tick[i] = tick
-        read = tick == 0 or not happens(key, tick, MISSED, e.parameters.missed_periods[i])
-        for axis in range(2):
-            force = world.force[axis, i]
-            sensed = force + (e.gain[axis, i] * force + e.crosstalk[axis, i] * world.force[1 - axis, i]) + e.bias[axis, i]
-            share = 1.0 if tick == 0 else e.passed[i]
-            if not again:
-                passed[axis, i] = passed[axis, i] + share * (sensed - passed[axis, i]) if share < 1.0 else sensed
-            value = passed[axis, i] + noise_of(key, tick, NOISE_OF_FORCE + axis, e.parameters.force_noise[i])
-            value = converted(value, e.force_step[i], -shared.force_range, shared.force_range)
-            for k in range(slots if tick == 0 else 1):
-                late[(tick + k) % slots, axis, i] = value
-            if read:
-                newer = late[newest % slots, axis, i]
-                readings.force[axis, i] = newer + rest * (late[earlier % slots, axis, i] - newer)
-            if shared.share > 0.0:
-                velocity, last = world.motion.velocity[axis, i], own.low_passed[axis, i]
-                if not again:
-                    # Where an episode begins nothing is known of the motion before it: the acceleration is taken for zero.
-                    change = velocity - (velocity if tick == 0 else own.velocity[axis, i])
-                    felt = (1.0 + e.acceleration_gain[axis, i]) * (change / shared.period) + e.acceleration_bias[axis, i]
-                    own.velocity[axis, i] = velocity
-                    own.low_passed[axis, i] = felt if tick == 0 else last + shared.share * (felt - last)
-                if read:
-                    noise = noise_of(key, tick, acceleration.NOISE + axis, shared.acceleration_noise)
-                    readings.acceleration[axis, i] = own.low_passed[axis, i] + noise
+        track(world, seen.time[i], shared, e, queue, arrived, key, i)
+        again, read = seen_again(own, tick, i), is_read(e, key, tick, i)
+        sense_force(world, readings, passed, late, e, shared, key, again, read, i)
+        sense_acceleration(world, readings, own, e, shared, key, again, read, i)
         if read:
-            stamp = arrived.time[i] + (e.parameters.position_latency[i] - shared.stamped)
-            readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
-            for axis in range(2):
-                readings.position[axis, i], readings.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
-            for chamber in range(4):
-                noise = noise_of(key, tick, chamber, e.parameters.pressure_noise[i])
-                value = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
-                readings.pressure[chamber, i] = converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
-        seen.position_time[i] = readings.position_time[i]
-        for axis in range(2):
-            seen.position[axis, i], seen.velocity[axis, i] = readings.position[axis, i], readings.velocity[axis, i]
-            seen.user_force[axis, i], seen.acceleration[axis, i] = readings.force[axis, i], readings.acceleration[axis, i]
-        for chamber in range(4):
-            seen.pressure[chamber, i] = readings.pressure[chamber, i]
+            read_tracker(seen, readings, arrived, e, shared, i)
+            sense_pressures(world, readings, e, shared, key, i)
+        show(seen, readings, i)
     return 0
 
 
@@ -179,13 +138,17 @@ class BoardSensors(SensorModel):
 
     def _make_room(self) -> None:
         lanes, board = len(self._keys), self._electronics
-        latest = {
-            name: max(getattr(board, name), self._ranges.get(name, (0.0, 0.0))[1])
-            for name in ("position_latency", "force_latency")
-        }
-        slots = tracker.slots(Shared(self._shared).rate, latest["position_latency"])
+        slots = tracker.slots(*self._position_clock())
         self._queue: Array = np.zeros((slots, 3, lanes))
-        self._late: Array = np.zeros((int(latest["force_latency"] / board.control_period + 1e-9) + 2, 2, lanes))
+        self._late: Array = np.zeros((int(self._latest("force_latency") / board.control_period + 1e-9) + 2, 2, lanes))
+
+    def _latest(self, name: str) -> float:
+        """The largest that a latency of the board can be, s."""
+        return max(float(getattr(self._electronics, name)), self._ranges.get(name, (0.0, 0.0))[1])
+
+    def _position_clock(self) -> tuple[float, float]:
+        """Samples per second of what measures positions, and its largest latency, s."""
+        return Shared(self._shared).rate, self._latest("position_latency")
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -197,7 +160,8 @@ class BoardSensors(SensorModel):
         for name in SENSOR_PARAMETERS:
             getattr(parameters, name)[:] = getattr(self._electronics, name)
         for name, (low, high) in self._ranges.items():
-            getattr(parameters, name)[:] = rng.uniform(low, high)
+            if name in SENSOR_PARAMETERS:
+                getattr(parameters, name)[:] = rng.uniform(low, high)
         errors = Errors(np.empty_like(unit, shape=(Errors.size, len(lanes))))
         over(work_out, parameters, Unit(unit), Shared(self._shared), errors)
         # Drawn last, so that all else is drawn as on a rig without such a sensor.
@@ -210,6 +174,10 @@ class BoardSensors(SensorModel):
     def tells_acceleration(self) -> bool:
         return Shared(self._shared).share > 0.0
 
-    def stage(self) -> Stage:
+    @property
+    def _tables(self) -> tuple[NDArray[Any], ...]:
         tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)
-        return Stage(_look, self._shared, tables=(*tables, self._readings, self._accelerometer))
+        return (*tables, self._readings, self._accelerometer)
+
+    def stage(self) -> Stage:
+        return Stage(_look, self._shared, tables=self._tables)

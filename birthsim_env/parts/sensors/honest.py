@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import OPENING, TICK, Seen, World
 from birthsim_env.loop.stage import Stage, table1, table2
-from birthsim_env.parts.sensors.board import MISSED, BoardSensors, converted
+from birthsim_env.parts.sensors.board import BoardSensors
 from birthsim_env.parts.sensors.noise import happens, uniform
+from birthsim_env.parts.sensors.readings import MISSED, converted
 from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS, Errors, Shared, shift
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -20,7 +21,7 @@ from birthsim_env.physics.electronics import Electronics
 from birthsim_env.registry import register
 
 LATE = 10
-"""Channel of random numbers of the clock; ``board`` has the others."""
+"""Channel of random numbers of the clock; ``board`` and ``readings`` have the others."""
 
 
 @kernel
@@ -44,12 +45,9 @@ def _put_out(world: World, seen: Seen, memory: int, constants: int, tables: int,
     return 0
 
 
-@register(sensors="honest", about="Tracker, cells and force sensor with every error that data sheets name.", order=3)
-class HonestSensors(BoardSensors):
+class HonestBoard(BoardSensors):
     """``BoardSensors`` with all of their errors, whose figures episodes may draw. The valves are commanded through a converter,
     and stay as they were in a missed period (``board_stage``)."""
-
-    drawn = tuple(f"electronics.{name}" for name in SENSOR_PARAMETERS)
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         super().__init__(electronics, num_envs)
@@ -69,10 +67,6 @@ class HonestSensors(BoardSensors):
         """``sensor_errors.Errors`` that the episode of each lane has, (M, N)."""
         return self._errors
 
-    def shift(self, place: Array) -> Array:
-        """By how much scale and distortion move what the tracker shows of true places, both (2, N), m."""
-        return shift(Errors(self._errors), Shared(self._shared), place)
-
     def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
         out, tick = np.array(openings, dtype=np.float64, order="C"), np.array(ticks[None], dtype=np.float64)
         Loop(len(ticks), [(tick, TICK)], [(out, OPENING)], [self.board_stage()]).run()
@@ -80,3 +74,14 @@ class HonestSensors(BoardSensors):
 
     def board_stage(self) -> Stage:
         return Stage(_put_out, tables=(self._keys.view(np.float64), self._errors, self._last))
+
+
+@register(sensors="honest", about="Tracker, cells and force sensor with every error that data sheets name.", order=3)
+class HonestSensors(HonestBoard):
+    """A tracker, pressure cells and a force sensor at the head, on such a board."""
+
+    drawn = tuple(f"electronics.{name}" for name in SENSOR_PARAMETERS)
+
+    def shift(self, place: Array) -> Array:
+        """By how much scale and distortion move what the tracker shows of true places, both (2, N), m."""
+        return shift(Errors(self._errors), Shared(self._shared), place)

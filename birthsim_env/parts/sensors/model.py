@@ -14,7 +14,7 @@ from birthsim_env.loop.rows import FORCE, MOTION, STATE, TICK, Signals, measurem
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, Staged
 from birthsim_env.parts.drawn.seeding import vectorised
-from birthsim_env.physics.compiled.lanes import PRESSURES, Array
+from birthsim_env.physics.compiled.lanes import PRESSURES, Y1, Array
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.registry import entries, entry
 
@@ -51,7 +51,16 @@ class SensorModel(Staged):
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane, with that lane's own random stream."""
 
-    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
+    def measure(
+        self,
+        ticks: NDArray[np.int64],
+        time: Array,
+        motion: Array,
+        pressures: Array,
+        force: Array,
+        pistons: Array | None = None,
+        rig: Array | None = None,
+    ) -> Measurement:
         """What the sensors say: by default what the ``stage`` does.
 
         Parameters
@@ -66,16 +75,21 @@ class SensorModel(Staged):
             Of the chambers P1, N1, P2, N2, Pa.
         force : array (2, N)
             Of the hand on the end effector, N.
+        pistons : array (4, N), optional
+            y1, v1, y2, v2 of both pistons, m and m/s, for what is measured at the cylinders.
+        rig : array (PARAMETERS, N), optional
+            The rig's parameters, ``Plant.lane_parameters``, likewise.
         """
         stage = self.stage()
         if stage is None:
             raise NotImplementedError(
-                f"{type(self).__name__} has neither measure(ticks, time, motion, pressures, force) nor stage()"
+                f"{type(self).__name__} has neither measure(ticks, time, motion, pressures, force, pistons, rig) nor stage()"
             )
         seen = np.zeros((Signals.size, len(time)))
         Signals(seen).time[:] = time
         cells = [(pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES)]
         world = [(ticks[None], TICK), (motion, MOTION), (force, FORCE), *cells]
+        world += [(one, row) for one, row in ((pistons, STATE + Y1), (rig, 0)) if one is not None]
         placed = [(np.ascontiguousarray(array, dtype=np.float64), row) for array, row in world]
         Loop(len(time), placed, [(seen, 0)], [stage]).run()
         return measurement_of(seen, self.sampled, self.tells_acceleration)

@@ -15,10 +15,11 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.electronics import Electronics
+from birthsim_env.physics.joint_sensors import JointSensors
 
-_DRAWN = {name: one for name, one in Electronics.parameters.items() if one.range}
+_DRAWN = {name: one for name, one in Electronics.parameters.items() if one.range and name not in JointSensors.parameters}
 SENSOR_PARAMETERS = tuple(_DRAWN)
-"""Parameters in which lanes may differ, in the order of their fields."""
+"""Parameters of the sensors of ``honest`` in which lanes may differ, in the order of their fields."""
 
 SensorParameters: Any = type("SensorParameters", (Rows,), {name: row(one.unit, one.about) for name, one in _DRAWN.items()})
 """``SENSOR_PARAMETERS`` as rows."""

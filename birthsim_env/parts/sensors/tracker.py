@@ -1,5 +1,7 @@
 """A tracker's clock: when it takes samples, when they arrive, and the velocity that is worked out from them.
 
+An encoder has one too: what is called the position of the end effector here is then that of both pistons.
+
 ``queue`` (Q, 3, N) holds the last samples taken, each a ``Sample``.
 """
 
@@ -24,7 +26,7 @@ class Arrived(Sample):
 
 
 RATE_TIME = 0.02
-"""s; assumed: time constant of the low-pass on the position differences that stand for the velocity."""
+"""s; assumed: time constant of the low-pass on a tracker's position differences, which stand for the velocity."""
 
 
 def slots(rate: float, latency: float) -> int:
@@ -57,13 +59,13 @@ def start(queue: Array, arrived: Arrived, i: int, x: float, y: float, vx: float,
 
 
 @helper
-def arrive(queue: Array, arrived: Arrived, i: int, time: float, latency: float) -> None:
-    """Let arrive what has been under way for ``latency`` s."""
+def arrive(queue: Array, arrived: Arrived, i: int, time: float, latency: float, rate_time: float) -> None:
+    """Let arrive what has been under way for ``latency`` s; ``rate_time``, s, is the time constant of the velocity."""
     for k in range(queue.shape[0]):
         sample = Sample(queue[k])
         if sample.time[i] > arrived.time[i] and sample.time[i] + latency <= time + 1e-9:
             step = sample.time[i] - arrived.time[i]
-            fraction = step / (RATE_TIME + step)
+            fraction = step / (rate_time + step)
             for axis in range(2):
                 moved = sample.position[axis, i] - arrived.position[axis, i]
                 arrived.velocity[axis, i] += fraction * (moved / step - arrived.velocity[axis, i])

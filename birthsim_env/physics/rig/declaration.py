@@ -71,6 +71,8 @@ class Parameter:
         What domain randomisation draws it from, (low, high).
     on_request : bool
         Whether ``range`` is drawn from only where ``randomize`` or the owner's own ranges name the parameter.
+    logarithmic : bool
+        Whether its logarithm is drawn uniformly, of a parameter that is known by its order of magnitude alone.
     identified : Prior, optional
         What is known of it beforehand, where identification may find it from a log.
     option : bool
@@ -96,6 +98,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     range: tuple[float, float] | None = None
     on_request: bool = False
+    logarithmic: bool = False
     identified: Prior | None = None
     option: bool = False
     shared: bool = False
@@ -108,6 +111,12 @@ class Parameter:
         if self.choices:
             return f"one of {', '.join(map(repr, self.choices))}"
         return f"a finite number{limits(self.above, self.least, self.most)} ({self.unit})"
+
+    @property
+    def drawn(self) -> str:
+        """What it is drawn from, in words; nothing where it is not drawn."""
+        how = ", logarithmic" if self.logarithmic else ""
+        return f"{self.range[0]:g} to {self.range[1]:g}{how}" if self.range else ""
 
     def allows(self, value: Any) -> bool:
         """Whether a value is allowed."""
@@ -172,6 +181,7 @@ class Section:
     """A group of parameters: it checks every value by name, and lists its parameters in the docstring of each subclass.
 
     A subclass that is not of the ``plant`` has no rows in kernels of the rig; one that is ``shared`` is the same in all lanes.
+    What a section declares comes before what it takes from the section that it derives from.
     """
 
     parameters: ClassVar[Mapping[str, Parameter]]
@@ -181,11 +191,12 @@ class Section:
         """Collect what is declared, and append it to the docstring."""
         fields = {name: one.metadata["declared"] for name, one in vars(cls).items() if isinstance(one, dataclasses.Field)}
         more = {**({} if plant else {"row": None}), **({"shared": True} if shared else {})}
-        cls.parameters = {name: dataclasses.replace(one, **more) for name, one in fields.items()}
+        own = {name: dataclasses.replace(one, **more) for name, one in fields.items()}
+        cls.parameters = {**own, **getattr(cls, "parameters", {})}
         cls.derived = {name: one for name, one in vars(cls).items() if isinstance(one, Derived)}
         lines = [cls.__doc__ or "", "", LISTED, ""]
         for name, one in cls.parameters.items():
-            drawn = f"; {one.range[0]:g} to {one.range[1]:g}{' on request' if one.on_request else ''}" if one.range else ""
+            drawn = f"; {one.drawn}{' on request' if one.on_request else ''}" if one.range else ""
             lines.append(f"- ``{name}`` = {one.default!r} ({one.unit}): {one.about}; {one.source}{drawn}")
         cls.__doc__ = "\n".join(lines)
 

@@ -56,7 +56,7 @@ class Cylinder(Section):
     stroke: float = parameter("m", "travel", default=0.200, source="Table I", least=1e-3, most=10, shared=True, row=None)
     coulomb_friction: float = parameter(
         "N",
-        "Coulomb friction Fc",
+        "Coulomb friction Fc, with both chambers at atmospheric pressure where it grows with theirs",
         default=12.0,
         source="assumed, 4-5 % of the rated force",
         least=0,
@@ -64,6 +64,30 @@ class Cylinder(Section):
         range=(6, 25),
         identified=Prior(0.7),
         row="fc",
+    )
+    pressure_friction: float = parameter(
+        "N/Pa",
+        "growth of Coulomb friction with the sum of both gauge pressures",
+        default=0.0,
+        source="0.23 to 0.91 N/bar of four seals of 25 mm, Zillen 2021",
+        least=0,
+        most=1e-3,
+        option=True,
+        range=(2e-6, 9e-6),
+        on_request=True,
+        row="fp",
+    )
+    direction_asymmetry: float = parameter(
+        "-",
+        "share by which dry friction is larger outwards, and smaller inwards",
+        default=0.0,
+        source="assumed; Zhu 2006 has two levels",
+        least=-0.9,
+        most=0.9,
+        option=True,
+        range=(-0.2, 0.2),
+        on_request=True,
+        row="asymmetry",
     )
     viscous_friction: float = parameter(
         "N s/m",
@@ -194,7 +218,6 @@ class Friction(Section):
         least=1,
         most=10,
         identified=Prior(0.7, floor=1.0),
-        row=None,
     )
     stribeck_speed: float = parameter(
         "m/s",
@@ -207,7 +230,17 @@ class Friction(Section):
         row="stribeck",
     )
     bristle_stiffness: float = parameter(
-        "N/m", "bristle stiffness s0", default=5e4, source="assumed", least=1, most=5e5, identified=Prior(0.7), row="s0"
+        "N/m",
+        "bristle stiffness s0",
+        default=5e4,
+        source="assumed; measured friction tells it no better than by a factor of 10",
+        least=1,
+        most=5e5,
+        range=(5e3, 5e5),
+        on_request=True,
+        logarithmic=True,
+        identified=Prior(0.7),
+        row="s0",
     )
     bristle_damping: float = parameter(
         "N s/m", "bristle damping s1", default=150.0, source="assumed", least=0, most=2000, identified=Prior(0.7), row="s1"

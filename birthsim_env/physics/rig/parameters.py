@@ -15,14 +15,15 @@ from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.rig.consistency import check_together, follow
 from birthsim_env.physics.rig.declaration import Parameter, Section, derived
 from birthsim_env.physics.rig.mechanical import Cylinder, Friction, Geometry, Mechanics
-from birthsim_env.physics.rig.pneumatic import Air, Chambers, Valves
+from birthsim_env.physics.rig.pneumatic import Air, Chambers
 from birthsim_env.physics.rig.reading import read_toml
+from birthsim_env.physics.rig.servovalves import Valve, Valves, edge_rows
 from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
 from birthsim_env.physics.step import STEP
 
 __all__ = [
     "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters",
-    "Valves", "load_parameters", "parameter_of", "value_of",
+    "Valve", "Valves", "load_parameters", "parameter_of", "value_of",
 ]  # fmt: skip
 
 
@@ -49,7 +50,9 @@ class Parameters:
     chambers : Chambers
         Dead volume (m3), heat transfer, leaks and tubes.
     valves : Valves
-        Their conductance and what is imperfect in their spools.
+        Their conductance and characteristic, and what is imperfect in their spools.
+    valve_p1, valve_n1, valve_p2, valve_n2 : Valve
+        What the valve of each chamber has more than all four share.
     air : Air
         Supply and atmosphere (Pa), temperature (K), and the gas itself.
     electronics : Electronics
@@ -85,13 +88,16 @@ class Parameters:
     friction: Friction = Friction()
     chambers: Chambers = Chambers()
     valves: Valves = Valves()
+    valve_p1: Valve = Valve()
+    valve_n1: Valve = Valve()
+    valve_p2: Valve = Valve()
+    valve_n2: Valve = Valve()
     air: Air = Air()
     electronics: Electronics = Electronics()
     ranges: tuple[tuple[str, float, float], ...] = ()
 
-    fs1 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder1.coulomb_friction)
-    fs2 = derived("N", "static friction", lambda rig: rig.friction.static_ratio * rig.cylinder2.coulomb_friction)
     tube_rate = derived("1/s", "c/L of the tubes", _tube_rate)
+    vars().update(edge_rows())
 
     def __post_init__(self) -> None:
         for name, part in SECTIONS.items():

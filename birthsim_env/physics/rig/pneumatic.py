@@ -1,11 +1,10 @@
-"""The pneumatic sections of a rig: what its chambers share, valves, air."""
+"""The pneumatic sections of a rig: what its chambers share, and air."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from birthsim_env.physics import valves
 from birthsim_env.physics.rig.declaration import Prior, Section, derived, parameter
 
 
@@ -77,92 +76,6 @@ class Chambers(Section):
     whole_dead_volume = derived(
         "m3", "dead volume of a chamber, with its tube", lambda own: own.dead_volume + _tube_volume(own), row="dead_volume"
     )
-
-
-@dataclass(frozen=True)
-class Valves(Section):
-    """Proportional servovalve: ISO 6358 orifices behind a spool with a first-order lag."""
-
-    sonic_conductance: float = parameter(
-        "m3/(s Pa)",
-        "sonic conductance C",
-        default=3.9e-9,
-        source="from 100 l/min nominal, 6 to 5 bar",
-        least=1e-12,
-        most=2e-8,
-        identified=Prior(0.5),
-        row="conductance",
-    )
-    critical_ratio: float = parameter(
-        "-",
-        "critical pressure ratio b",
-        default=0.30,
-        source="from 100 l/min nominal, 6 to 5 bar",
-        least=0,
-        most=0.9,
-        identified=Prior(0.3),
-        row="critical",
-    )
-    leakage_ratio: float = parameter(
-        "-",
-        "leakage over sonic conductance, Cl/C",
-        default=0.005,
-        source="assumed",
-        least=0,
-        most=0.5,
-        identified=Prior(0.7),
-        row=None,
-    )
-    time_constant: float = parameter(
-        "s",
-        "time constant of a spool",
-        default=0.004,
-        source="assumed; -3 dB at 40 Hz",
-        least=2e-4,
-        most=10,
-        range=(0.0015, 0.008),
-        identified=Prior(0.7),
-        row="tau",
-    )
-    deadband: float = parameter(
-        "-",
-        "opening within which nothing opens; 0 is none",
-        default=0.0,
-        source="up to 0.05 assumed of overlapped spools",
-        least=0,
-        most=0.5,
-        option=True,
-        range=(0, 0.05),
-        on_request=True,
-    )
-    hysteresis: float = parameter(
-        "-",
-        "width of the play in the opening; 0 is none",
-        default=0.0,
-        source="up to 0.02 assumed",
-        least=0,
-        most=0.5,
-        option=True,
-        range=(0, 0.02),
-        on_request=True,
-        row="play",
-    )
-    opening_limit: float = parameter(
-        "-",
-        "largest opening; 1 is full",
-        default=1.0,
-        source="0.8 to 1 assumed",
-        above=0,
-        most=1,
-        option=True,
-        range=(0.8, 1),
-        on_request=True,
-    )
-
-    leakage = derived("m3/(s Pa)", "leakage conductance", lambda own: own.leakage_ratio * own.sonic_conductance)
-    knee = derived("1", "1/(1 - critical)", lambda own: 1 / (1 - own.critical_ratio))
-    laminar = derived("1", "of ``valves.laminar_slope``", lambda own: valves.laminar_slope(own.critical_ratio))
-    spool_rate = derived("1/s", "1/tau", lambda own: 1 / own.time_constant)
 
 
 @dataclass(frozen=True)

@@ -32,22 +32,30 @@ SCALES = np.array([0.1, 0.1, 0.1, 0.1, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1
 
 
 def constants(rig: Parameters) -> tuple[Array, ...]:
-    """Numbers of a rig: linkage, mass, friction per cylinder, chambers, valves, air."""
+    """Numbers of a rig: linkage, mass, friction per cylinder, chambers, valves, their edges, air."""
     g, m, f, v, air = rig.geometry, rig.mechanics, rig.friction, rig.valves, rig.air
     cylinders = (rig.cylinder1, rig.cylinder2)
     pivot = g.d3 * np.exp(1j * g.gamma3)
     linkage = np.array([pivot.real, pivot.imag, g.d6, g.k1, g.k2, m.mass, m.gravity])
     sizes = [(c.piston_diameter, c.rod_diameter, c.stroke) for c in cylinders]
-    pistons = np.array([(*size, c.coulomb_friction, c.viscous_friction) for size, c in zip(sizes, cylinders, strict=True)])
+    rubbing = [(c.coulomb_friction, c.pressure_friction, c.direction_asymmetry, c.viscous_friction) for c in cylinders]
+    pistons = np.array([(*size, *level) for size, level in zip(sizes, rubbing, strict=True)])
     bristle = f.bristle_stiffness, f.bristle_damping
     number = ("coulomb", "lugre", "elasto_plastic").index(f.law)
     law = np.array([number, f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio], dtype=float)
     heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
     valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
+    edges = np.empty((4, 2, 3))  # overlap, curvature and share of the edges to supply and exhaust
+    for k, own in enumerate((rig.valve_p1, rig.valve_n1, rig.valve_p2, rig.valve_n2)):
+        to_supply = v.supply_overlap + own.supply_overlap, v.supply_curvature + own.supply_curvature
+        to_exhaust = v.exhaust_overlap + own.exhaust_overlap, v.exhaust_curvature + own.exhaust_curvature
+        edges[k, 0] = *to_supply, 1 + own.supply_conductance
+        edges[k, 1] = *to_exhaust, v.exhaust_ratio * (1 + own.exhaust_conductance)
+    edges[:, :, 0] = edges[:, :, 0].clip(0)
     around = air.supply_pressure, air.atmospheric_pressure, air.temperature
     reference = air.reference_density, air.reference_temperature
     gas = np.array([*around, air.gas_constant, air.heat_capacity_ratio, *reference])
-    return linkage, pistons, law, heat, valve, gas
+    return linkage, pistons, law, heat, valve, edges, gas
 
 
 def compiled(function: F) -> F:
@@ -71,6 +79,17 @@ def orifice(conductance: float, p_up: float, t_up: float, p_down: float, b: floa
 
 
 @compiled
+def opened(stroke: float, edge: Array) -> float:
+    """Part of the conductance that an edge opens after a stroke towards it: nothing within the overlap, then a parabola."""
+    overlap, curvature, share = edge
+    if stroke <= overlap:
+        return 0.0
+    t = (stroke - overlap) / (1 - overlap)
+    part: float = share * t * (1 + curvature * (1 - t))
+    return part
+
+
+@compiled
 def plastic_fraction(z: float, v: float, steady: float, breakaway: float) -> float:
     """alpha of the elasto-plastic law: where the bristle leans the way it moves, a cubic from z_ba to z_ss."""
     if z * v <= 0 or abs(z) <= breakaway * steady:
@@ -83,7 +102,16 @@ def plastic_fraction(z: float, v: float, steady: float, breakaway: float) -> flo
 
 @compiled
 def rates(
-    s: Array, command: Array, push: Array, linkage: Array, pistons: Array, law: Array, heat: Array, valve: Array, gas: Array
+    s: Array,
+    command: Array,
+    push: Array,
+    linkage: Array,
+    pistons: Array,
+    law: Array,
+    heat: Array,
+    valve: Array,
+    edges: Array,
+    gas: Array,
 ) -> Array:
     """d(state)/dt."""
     ox, oy, d6, k1, k2, mass, gravity = linkage
@@ -104,7 +132,7 @@ def rates(
 
     along = np.zeros(2)
     for c in range(2):
-        bore, rod, stroke, fc, fv = pistons[c]
+        bore, rod, stroke, unpressed, growth, asymmetry, fv = pistons[c]
         full, ring = np.pi / 4 * bore**2, np.pi / 4 * (bore**2 - rod**2)
         v, pressure, temperature = speed[c], np.zeros(2), np.zeros(2)
         volume, rate, wall = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -118,20 +146,23 @@ def rates(
         for side in range(2):
             p, t, k = pressure[side], temperature[side], 2 * c + side
             spool = s[14 + k]
-            opened_in, opened_out = valve[2] + valve[0] * max(spool, 0.0), valve[2] + valve[0] * max(-spool, 0.0)
+            opened_in = valve[2] + valve[0] * opened(spool, edges[k, 0])
+            opened_out = valve[2] + valve[0] * opened(-spool, edges[k, 1])
             mass_rate, enthalpy_rate, cp = 0.0, 0.0, gamma * r / (gamma - 1)
-            for source, opened in ((supply, opened_in), (atmosphere, opened_out)):
+            for source, conductance in ((supply, opened_in), (atmosphere, opened_out)):
                 if source > p:
-                    q = orifice(opened, source, ambient, p, valve[1], rho, t_ref)
+                    q = orifice(conductance, source, ambient, p, valve[1], rho, t_ref)
                     mass_rate, enthalpy_rate = mass_rate + q, enthalpy_rate + q * cp * ambient
                 else:
-                    q = orifice(opened, p, t, source, valve[1], rho, t_ref)
+                    q = orifice(conductance, p, t, source, valve[1], rho, t_ref)
                     mass_rate, enthalpy_rate = mass_rate - q, enthalpy_rate - q * cp * t
             warming = heat[1] * wall[side] * (ambient - t) + heat[2] * (temperature[1 - side] - t)
             ds[4 + k] = mass_rate
             ds[8 + k] = enthalpy_rate - p * rate[side] + warming
             ds[14 + k] = (command[k] - spool) / valve[3]
 
+        fc = unpressed + growth * ((pressure[0] - atmosphere) + (pressure[1] - atmosphere))
+        fc = max(fc, 0.0) * (1 + asymmetry * np.sign(v))
         if law[0] > 0:
             level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
             alpha = 1.0 if law[0] == 1 else plastic_fraction(s[12 + c], v, level / law[3], law[6])

@@ -10,7 +10,7 @@ controller that is allowed an error may get further.
 
 import numpy as np
 
-from baselines.estimation import reference_friction
+from baselines.estimation import dry_friction, reference_friction
 from baselines.impedance import Complex, Impedance
 from baselines.valve_inverse import CLEARANCE, air_at, driving_flows, stiffness_of
 from birthsim_env.loop.signals import Reference
@@ -29,22 +29,24 @@ def _commanded(load: Array, position: Array, speed: Array, stiffness: Array, p: 
     """Writes the largest opening that a motion commands, 1 at a valve's limit: ``largest`` (2, N) from the load on the pistons
     besides friction, N, positions, m, and speeds, m/s, (2, N, T), at the pneumatic stiffness (2, N), N/m."""
     for k in range(2):
-        fc, fs, fv, half = (p.fc1, p.fs1, p.fv1, p.half_l1) if k == 0 else (p.fc2, p.fs2, p.fv2, p.half_l2)
+        fv, half = (p.fv1, p.half_l1) if k == 0 else (p.fv2, p.half_l2)
         ap, an = (p.area_p1, p.area_n1) if k == 0 else (p.area_p2, p.area_n2)
         for i in range(load.shape[1]):
-            z, before, opening, most = 0.0, 0.0, 0.0, 0.0
+            z, before, opening, most, pressures = 0.0, 0.0, 0.0, 0.0, np.full((4, 1), p.atmosphere)
             for t in range(load.shape[2]):
                 y, v = position[k, i, t], speed[k, i, t]
-                z = reference_friction.bristle(z, v, fc, fs, p, STEP)
+                # Friction at the pressures of the step before, which change little in one.
+                z = reference_friction.bristle(z, v, dry_friction.level_moving(k, v, pressures, 0, p), p, STEP)
                 force = load[k, i, t] + p.s0 * z + fv * v
                 rate, before = (force - before) / STEP, force
-                if t * STEP < SETTLED:
-                    continue
                 # As in ``equilibrium.balance``: both pressures for a force and a stiffness, between atmosphere and supply.
                 length_p, length_n = max(half + y, CLEARANCE), max(half - y, CLEARANCE)
                 force += p.atmosphere * (ap - an)
                 a = (stiffness[k, i] / p.index + force / length_n) / (1.0 / length_p + 1.0 / length_n)
                 a = min(p.supply * ap, p.supply * an + force, max(p.atmosphere * ap, p.atmosphere * an + force, a))
+                pressures[2 * k, 0], pressures[2 * k + 1, 0] = a / ap, (a - force) / an
+                if t * STEP < SETTLED:
+                    continue
                 air = air_at(k, a / ap, (a - force) / an, y, v, p)
                 stroke = length_p + length_n
                 active = control_model.active_flow_for(rate, stiffness_of(air, p), v, stroke, p.index, p.gas * p.temperature)

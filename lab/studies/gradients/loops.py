@@ -21,7 +21,7 @@ MOTIONS = np.array([0.01, 0.01, 0.1, 0.1])[:, None]
 """m and m/s: size of the end effector's changes."""
 
 
-SMOOTH = Parameters().replace({"electronics.adc_bits": 0.0, "electronics.dac_bits": 0.0})
+SMOOTH = Parameters().replace({f"electronics.{name}": 0.0 for name in ("adc_bits", "dac_bits", "encoder_resolution")})
 """A rig without converters: what these round has a slope of 0 in differences."""
 
 

@@ -96,8 +96,7 @@ class Process:
         environment.pop("NUMBA_CACHE_DIR", None)
         if cache is not None:
             environment["NUMBA_CACHE_DIR"] = str(cache)
-        if not prebuilt:
-            environment["BIRTHSIM_PREBUILT"] = "0"
+        environment["BIRTHSIM_PREBUILT"] = f"{prebuilt:d}"
         # -P keeps the modules beside the script out of the way.
         line = [sys.executable, "-P", stopwatch.__file__]
         self._tree = tree

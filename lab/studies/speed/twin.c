@@ -37,14 +37,22 @@ static inline double orifice_flow(double conductance, double p_from, double t_fr
     return p_from > p_to ? size : -size;
 }
 
+/* Part of a valve's conductance that one of its edges, whose three rows begin at `first` and lie 4 apart, opens after a stroke
+ * towards it: t (1 + c (1 - t)) with t = (stroke - d) / (1 - d), multiplied out in stroke - d. */
+static inline double opened(double stroke, const row *p, int first, int i) {
+    double beyond = fmax(stroke - p[first][i], 0.0);
+    return beyond * p[first + 4][i] - beyond * beyond * p[first + 8][i];
+}
+
 /* dP/dt and dT/dt of a chamber named by its state rows, in lane i; `length` is that of its air column, m. */
 static inline void chamber(const row *x, const row *p, row *dx, int i, int pressure_row, int temperature_row, int other_row,
                            int spool_row, int area_row, int perimeter_row, double length, double length_rate) {
     double pressure = x[pressure_row][i], temperature = x[temperature_row][i], spool = x[spool_row][i];
     double wall = p[TEMPERATURE][i], area = p[area_row][i], gas = p[GAS][i], gamma = p[GAMMA][i];
 
-    double supply = p[CONDUCTANCE][i] * fmax(spool, 0.0) + p[LEAKAGE][i];
-    double exhaust = p[CONDUCTANCE][i] * fmax(-spool, 0.0) + p[LEAKAGE][i];
+    int valve = spool_row - S1P;
+    double supply = p[CONDUCTANCE][i] * opened(spool, p, SUPPLY_OVERLAP_P1 + valve, i) + p[LEAKAGE][i];
+    double exhaust = p[CONDUCTANCE][i] * opened(-spool, p, EXHAUST_OVERLAP_P1 + valve, i) + p[LEAKAGE][i];
     double q_in = orifice_flow(supply, p[SUPPLY][i], wall, pressure, temperature, p[RHO0][i], p[T0][i], p[CRITICAL][i]);
     double q_out = orifice_flow(exhaust, pressure, temperature, p[ATMOSPHERE][i], wall, p[RHO0][i], p[T0][i], p[CRITICAL][i]);
 
@@ -71,10 +79,17 @@ static inline double bristle_rate(double v, double z, double level, double s0, i
     return (v - share * relaxation * z) * limit / fmax(relaxation, limit);
 }
 
+/* Coulomb friction of a piston, N, that moves at v between the absolute pressures p_p and p_n. */
+static inline double coulomb(double v, double p_p, double p_n, double atmosphere, double unpressed, double growth,
+                             double asymmetry) {
+    double level = unpressed + growth * ((p_p - atmosphere) + (p_n - atmosphere));
+    return fmax(level, 0.0) * (v > 0.0 ? 1.0 + asymmetry : 1.0 - asymmetry);
+}
+
 /* Friction of a piston, N, and the rate of its bristle, m/s. */
-static inline double friction(double v, double z, double fc, double fs, double fv, const row *p, int i, double *bristle) {
+static inline double friction(double v, double z, double fc, double fv, const row *p, int i, double *bristle) {
     int lugre = p[LUGRE][i] > 0.5, has_bristle = p[LUGRE][i] + p[ELASTO_PLASTIC][i] > 0.5;
-    double ratio = v / p[STRIBECK][i];
+    double ratio = v / p[STRIBECK][i], fs = p[STATIC_RATIO][i] * fc;
     double level = fmax(fc + (fs - fc) / (1.0 + ratio * ratio), SMALLEST_LEVEL);
     double rate = bristle_rate(v, z, level, p[S0][i], lugre, p[BREAKAWAY][i], p[STEEPNESS][i]);
     double by_bristle = p[S0][i] * z + p[S1][i] * rate + fv * v;
@@ -110,8 +125,10 @@ static void right_hand_side(const row *restrict x, const row *restrict u, const 
         double kappa = 2.0 * r2 * r4 / s;
 
         double dz1, dz2;
-        double friction1 = friction(v1, x[Z1][i], p[FC1][i], p[FS1][i], p[FV1][i], p, i, &dz1);
-        double friction2 = friction(v2, x[Z2][i], p[FC2][i], p[FS2][i], p[FV2][i], p, i, &dz2);
+        double fc1 = coulomb(v1, x[PP1][i], x[PN1][i], p[ATMOSPHERE][i], p[FC1][i], p[FP1][i], p[ASYMMETRY1][i]);
+        double fc2 = coulomb(v2, x[PP2][i], x[PN2][i], p[ATMOSPHERE][i], p[FC2][i], p[FP2][i], p[ASYMMETRY2][i]);
+        double friction1 = friction(v1, x[Z1][i], fc1, p[FV1][i], p, i, &dz1);
+        double friction2 = friction(v2, x[Z2][i], fc2, p[FV2][i], p, i, &dz2);
         double stop1 = stop_force(y1, v1, p[HALF_L1][i], p[STOP_STIFFNESS][i], p[STOP_DAMPING][i]);
         double stop2 = stop_force(y2, v2, p[HALF_L2][i], p[STOP_STIFFNESS][i], p[STOP_DAMPING][i]);
         double air1 = piston_force(x[PP1][i], x[PN1][i], p[AREA_P1][i], p[AREA_N1][i], p[ATMOSPHERE][i]);

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.accuracy.second_model import Array, SecondModel, compiled, orifice, rates
+from lab.studies.accuracy.second_model import Array, SecondModel, compiled, opened, orifice, rates
 
 STEP = 5e-5
 """s."""
@@ -82,6 +82,7 @@ def strange_rates(
     law: Array,
     heat: Array,
     valve: Array,
+    edges: Array,
     gas: Array,
     odd: Array,
 ) -> Array:
@@ -102,7 +103,7 @@ def strange_rates(
         ds[23:25], ds[25:27] = s[25:27], (push - spring) / mass
         ds[26] -= gravity
         force, linkage[5] = spring, linkage[5] - mass
-    ds[:18] = rates(own, command, force, linkage, pistons, law, heat, valve, air)
+    ds[:18] = rates(own, command, force, linkage, pistons, law, heat, valve, edges, air)
     if spool_frequency > 0.0:
         width = 2.0 * np.pi * spool_frequency
         ds[14:18], ds[19:23] = s[19:23], width * width * (command - s[14:18]) - 1.4 * width * s[19:23]
@@ -120,11 +121,11 @@ def strange_rates(
     if line > 0.0:
         drawn = 0.0
         for k in range(4):
-            opened = valve[2] + valve[0] * max(s[14 + k], 0.0)
+            conductance = valve[2] + valve[0] * opened(s[14 + k], edges[k, 0])
             if air[0] > pressure[k]:
-                drawn += orifice(opened, air[0], air[2], pressure[k], valve[1], rho, t_ref)
+                drawn += orifice(conductance, air[0], air[2], pressure[k], valve[1], rho, t_ref)
             else:
-                drawn -= orifice(opened, pressure[k], warmth[k], air[0], valve[1], rho, t_ref)
+                drawn -= orifice(conductance, pressure[k], warmth[k], air[0], valve[1], rho, t_ref)
         filled = orifice(line, gas[0], gas[2], min(air[0], gas[0]), valve[1], rho, t_ref)
         ds[18] = r * gas[2] / RESERVOIR * (filled - drawn)
     return ds
@@ -141,15 +142,16 @@ def integrate(
     law: Array,
     heat: Array,
     valve: Array,
+    edges: Array,
     gas: Array,
     odd: Array,
 ) -> tuple[Array, Array]:
     """The state (27,) after so many steps of ``STEP``, and the air in the chambers (2, 4)."""
     for _ in range(steps):
-        a = strange_rates(s, command, push, linkage, pistons, law, heat, valve, gas, odd)
-        b = strange_rates(s + 0.5 * STEP * a, command, push, linkage, pistons, law, heat, valve, gas, odd)
-        c = strange_rates(s + 0.5 * STEP * b, command, push, linkage, pistons, law, heat, valve, gas, odd)
-        d = strange_rates(s + STEP * c, command, push, linkage, pistons, law, heat, valve, gas, odd)
+        a = strange_rates(s, command, push, linkage, pistons, law, heat, valve, edges, gas, odd)
+        b = strange_rates(s + 0.5 * STEP * a, command, push, linkage, pistons, law, heat, valve, edges, gas, odd)
+        c = strange_rates(s + 0.5 * STEP * b, command, push, linkage, pistons, law, heat, valve, edges, gas, odd)
+        d = strange_rates(s + STEP * c, command, push, linkage, pistons, law, heat, valve, edges, gas, odd)
         s = s + STEP / 6.0 * (a + 2.0 * b + 2.0 * c + d)
     y1, y2, _, _ = pose(s, linkage)
     return s, air_in(s, y1, y2, pistons, heat[0], gas)

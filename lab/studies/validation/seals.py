@@ -26,7 +26,11 @@ SLIDING = 2e-3
 """m/s, above which a sample counts as sliding."""
 
 LAWS = {"LuGre": True, "elasto-plastic": False}
+SPEED, PRESSURE, FORCE = range(3)
+"""Rows of a ``motion``."""
+
 NAMES = ("f0", "per_bar", "static_ratio", "stribeck_speed", "bristle_stiffness", "viscous")
+F0, PER_BAR, RATIO, STRIBECK, STIFFNESS, VISCOUS = range(len(NAMES))
 UNITS = {
     "f0": "N",
     "per_bar": "N/bar",
@@ -60,28 +64,29 @@ def motion(file: Path) -> Array:
 
 
 @kernel
-def driven(moved: Array, numbers: Array, lugre: bool, found: Array) -> None:
-    """Friction (N) at every sample of ``motion``, of parameters in the order of ``NAMES``."""
-    f0, per_bar, ratio, stribeck, stiffness, viscous = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]
+def _driven(moved: Array, numbers: Array, lugre: bool, found: Array) -> None:
     deflection, steepness = 0.0, 1.0 / (1.0 - BREAKAWAY)
     for k in range(moved.shape[1]):
-        speed, rate = moved[0, k], 0.0
-        coulomb = f0 + per_bar * moved[1, k]
-        weakness = friction.inverse_level(speed, coulomb, ratio * coulomb, stribeck)
+        speed, rate = moved[SPEED, k], 0.0
+        coulomb = numbers[F0] + numbers[PER_BAR] * moved[PRESSURE, k]
+        weakness = friction.inverse_level(speed, coulomb, numbers[RATIO] * coulomb, numbers[STRIBECK])
         for _ in range(SUBSTEPS):
-            rate = friction.bristle_rate_by_law(speed, deflection, weakness, stiffness, lugre, BREAKAWAY, steepness)
+            rate = friction.bristle_rate_by_law(speed, deflection, weakness, numbers[STIFFNESS], lugre, BREAKAWAY, steepness)
             deflection += rate * PERIOD / SUBSTEPS
-        found[k] = friction.lugre_force(speed, deflection, rate, stiffness, DAMPING, viscous)
+        found[k] = friction.lugre_force(speed, deflection, rate, numbers[STIFFNESS], DAMPING, numbers[VISCOUS])
+
+
+def driven(moved: Array, numbers: Array, lugre: bool = True) -> Array:
+    """Friction (N) at every sample of ``motion``, of parameters in the order of ``NAMES``, (T,)."""
+    found = np.empty(moved.shape[1])
+    _driven(moved, np.ascontiguousarray(numbers, dtype=float), lugre, found)
+    return found
 
 
 def errors(numbers: Array, moved: list[Array], lugre: bool = True) -> list[Array]:
     """Measured less modelled friction of each motion, N, less its median, which holds the offsets of both sensors."""
-    left = []
-    for one in moved:
-        found = np.empty(one.shape[1])
-        driven(one, np.ascontiguousarray(numbers, dtype=float), lugre, found)
-        left.append(one[2] - found - np.median(one[2] - found))
-    return left
+    left = (one[FORCE] - driven(one, numbers, lugre) for one in moved)
+    return [one - np.median(one) for one in left]
 
 
 def fitted(moved: list[Array], by_pressure: bool, lugre: bool = True) -> Array:
@@ -110,7 +115,7 @@ def fitted(moved: list[Array], by_pressure: bool, lugre: bool = True) -> Array:
 
 def level(moved: Array) -> float:
     """Friction of sliding, N: half the difference of both directions' medians, from which offsets drop out."""
-    speed, force = moved[0], moved[2]
+    speed, force = moved[SPEED], moved[FORCE]
     return 0.5 * float(np.median(force[speed > SLIDING]) - np.median(force[speed < -SLIDING]))
 
 
@@ -138,5 +143,5 @@ def measure(data: str, seal: str, files: dict[str, str]) -> Result:
         numbers = fitted(moved, True, lugre)
         models[law]["by_pressure"] = _rms(errors(numbers, moved, lugre))
         models[law]["parameters"] = dict(zip(NAMES, numbers, strict=True))
-    speeds = [float(np.quantile(np.abs(one[0]), 0.99)) for one in moved]
+    speeds = [float(np.quantile(np.abs(one[SPEED]), 0.99)) for one in moved]
     return {"levels": [level(one) for one in moved], "models": models, "fastest": max(speeds), "files": files}

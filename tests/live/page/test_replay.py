@@ -22,7 +22,7 @@ DROP = """([bytes, name]) => {
     window.dispatchEvent(event("drop"));
 }"""
 """What a browser does when somebody drops a file."""
-OTHER = Parameters().replace({"geometry.d6": 0.26, "valves.deadband": 0.02})
+OTHER = Parameters().replace({"geometry.d6": 0.26, "valves.hysteresis": 0.02})
 NOTICES = "document.querySelector('#notices').textContent"
 
 

@@ -25,7 +25,10 @@ OFFERED = [
     for one in packed_page(Parameters()).content["hello"]["choices"]["controller"]
     if "missing" not in one and not one["name"].startswith(("limited", LEARNING))
 ]
-DEFAULT, WORN = Parameters(), Parameters().replace({"valves.deadband": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7})
+DEFAULT, WORN = (
+    Parameters(),
+    Parameters().replace({"valves.supply_overlap": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7}),
+)
 SOFT = Parameters().replace({"chambers.tube_length": 1.0, "air.supply_conductance": 2e-8, "mechanics.mode_frequency": 30.0})
 ANOTHER = {
     "scenario": "circle", "scenario_force": True, "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve",

@@ -25,7 +25,11 @@ import { frameOf, rowOf } from "./worker/frames.js";
 import { Session } from "./worker/session.js";
 
 const said = [];
-const flat = (rows) => text(rows.flatMap((row) => [...row]));
+const flat = (rows) => {
+  const all = new Float64Array(rows.length && rows.length * rows[0].length);
+  rows.forEach((row, k) => all.set(row, k * row.length));
+  return text(all);
+};
 for (const steps of given) {
   const session = new Session(pack, bundle);
   const told = [];
@@ -41,12 +45,13 @@ for (const steps of given) {
     else if (kind === "teach") session.teach(value);
     else if (kind === "put") (value[2] ? session.second : session).loop.set(value[0], value[1] ?? NaN);
     let done = 0;
-    if (kind === "advance") {
+    if (kind === "advance" || kind === "pass") {
       for (let k = 0; k < value; k += 1) {
         done += await session.advance(1, Infinity);
-        note();
+        if (kind === "advance") note();
       }
-    } else note();
+    }
+    if (kind !== "advance") note();
     const { lost, halted } = session;
     told.push({ rows: rows.map(flat), done, frame: frameOf(session), lost, halted, settings: session.shownSettings() });
   }
@@ -85,8 +90,8 @@ def node(folder, script, given=None):
 
 
 def run(folder, *cases):
-    """What a rig says after each step of each case, ("set" | "reset" | "hold" | "put" | "teach" | "advance", value);
-    ``folder`` holds the page."""
+    """What a rig says after each step of each case, ("set" | "reset" | "hold" | "put" | "teach" | "advance" | "pass", value);
+    of periods that pass only the last is told. ``folder`` holds the page."""
 
     def told(said):
         widths, texts = (ROWS, ROWS, COLUMNS, COLUMNS), said.pop("rows")

@@ -60,7 +60,7 @@ class OtherOptions:
         return total
 
     def advance(self, command, push, seconds):
-        air, gas = self.rig.air, self.inner.constants[5].copy()
+        air, gas = self.rig.air, self.inner.constants[6].copy()
         scales = np.concatenate([SCALES, [1e-3], [0.1] * 4])
 
         def rates(_, scaled):
@@ -76,7 +76,7 @@ class OtherOptions:
             if air.supply_conductance:
                 args = (air.supply_conductance, air.supply_pressure, air.temperature, gas[0], self.rig.valves.critical_ratio)
                 filled = second_model.orifice(*args, air.reference_density, air.reference_temperature)
-            ds = second_model.rates(s, command, force, *self.inner.constants[:5], gas)
+            ds = second_model.rates(s, command, force, *self.inner.constants[:6], gas)
             return np.concatenate([ds, [filled - self.drawn(s, gas[0])], falls]) / scales
 
         start = np.concatenate([self.inner.state, [self.reservoir], self.body]) / scales
@@ -167,7 +167,7 @@ def test_a_lane_without_options_among_others_has_the_bits_of_a_plain_plant():
         np.testing.assert_array_equal(plants[0].end_effector()[:, lane], alone.end_effector()[:, 0])
 
 
-WORN = {"valves.deadband": 0.05, "valves.opening_limit": 0.7}
+WORN = {"valves.supply_overlap": 0.05, "valves.exhaust_curvature": 0.3, "valves.opening_limit": 0.7}
 
 
 @pytest.mark.parametrize("changes", [*EACH.values(), WORN], ids=[*EACH, "worn valves"])
@@ -203,6 +203,6 @@ def test_every_range_can_be_drawn_and_none_is_unless_it_is_named():
     nominal = Parameters()
     assert checked_ranges(WORTH, nominal, "honest") == WORTH
     assert not set(WORTH) & set(documented_ranges(nominal, "honest"))
-    assert "deadband" not in nominal.to_dict()["valves"], "no stored rig changes"
+    assert "supply_overlap" not in nominal.to_dict()["valves"], "no stored rig changes"
     assert options.are_off(Plant().lane_parameters)
     assert Parameters.from_dict(nominal.replace(EACH["all"]).to_dict()) == nominal.replace(EACH["all"])

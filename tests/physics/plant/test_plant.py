@@ -87,7 +87,8 @@ def divisions_and_roots(kernel: str, block: int) -> Counter[str]:
     """Instructions in the machine code of a kernel for AVX2, packed and scalar."""
     target = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+sse,+sse2,+sse4.1,+sse4.2,+avx,+avx2"}
     line = [sys.executable, "-c", DISASSEMBLE.replace("KERNEL", repr(kernel))]
-    environment = {**os.environ, **target, "BIRTHSIM_BLOCK": str(block)}
+    own = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    environment = {**own, **target, "BIRTHSIM_BLOCK": str(block), "BIRTHSIM_DEBUG": "0"}
     done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
     return Counter(re.findall(r"^\s+v?(divpd|divsd|sqrtpd|sqrtsd)\b", done.stdout, re.MULTILINE))
 

@@ -14,7 +14,7 @@ import pytest
 
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.compiled.lanes import FS1, FS2, LUGRE, S0, SPOOLS, Z1, Z2, Array
+from birthsim_env.physics.compiled.lanes import FC1, FC2, LUGRE, S0, SPOOLS, STATIC_RATIO, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -64,7 +64,7 @@ def test_a_million_policy_steps_stay_finite_and_explained() -> None:
     rigs = corner_rigs(lanes, rng)
     plant = Plant(rigs, lanes)
     dead_volume = np.array([rig.chambers.dead_volume for rig in rigs])
-    breakaway = plant.lane_parameters[[FS1, FS2]] / plant.lane_parameters[S0]
+    breakaway = plant.lane_parameters[STATIC_RATIO] * plant.lane_parameters[[FC1, FC2]] / plant.lane_parameters[S0]
     # Work of 200 N, of the bore at full supply and of the weight over the whole stroke, all into 2 kg.
     outside, quickest = 0, math.sqrt(2 * (200 + 7e5 * BORE + 2 * 9.81) * 0.4 / 2)
     for command, force in rough_handling(lanes, steps, rng):

@@ -62,10 +62,10 @@ def test_every_number_of_the_plant_reaches_a_row() -> None:
 
 def test_who_reads_what() -> None:
     rig = Parameters()
-    assert parameters_read(lambda one: one.mechanics.mass + one.fs2, rig) == {
+    assert parameters_read(lambda one: one.mechanics.mass + one.tube_rate, rig) == {
         "mechanics.mass",
-        "friction.static_ratio",
-        "cylinder2.coulomb_friction",
+        "chambers.tube_length",
+        *("air.heat_capacity_ratio", "air.gas_constant", "air.temperature"),
     }
     assert parameters_read(lambda one: one.cylinder1.area_p, rig) == {"cylinder1.piston_diameter"}
 
@@ -73,7 +73,7 @@ def test_who_reads_what() -> None:
 def test_rows_of_other_values_than_floats() -> None:
     mass = np.array([2.0, 4.0])
     rows = dict(
-        zip(lanes.PARAMETER_NAMES, rows_of(Substitute(lambda name: mass if name == "mechanics.mass" else 0.5)), strict=True)
+        zip(lanes.PARAMETER_NAMES, rows_of(Substitute(lambda name: mass if name == "mechanics.mass" else 0.25)), strict=True)
     )
     np.testing.assert_array_equal(rows["inverse_mass"], [0.5, 0.25])
     sections = {name: part for name, part in vars(Parameters()).items() if name in SECTIONS}
