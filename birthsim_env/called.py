@@ -12,7 +12,7 @@ from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array
+from birthsim_env.physics.compiled.lanes import CELL_AT_VALVE, V1, V2, Y1, Y2, Array
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.restored import Declared, Kept
@@ -79,6 +79,7 @@ class Parts(Instant):
     def _measure(self, _: int) -> None:
         plant = self.plant
         at_cylinders = plant.state[[Y1, V1, Y2, V2]], plant.lane_parameters
-        now = self.sensors.measure(self.ticks, self.time, self.motion, plant.pressures, self.force, *at_cylinders)
+        cells = np.where(plant.lane_parameters[CELL_AT_VALVE] > 0.5, self._at_valves, plant.pressures)
+        now = self.sensors.measure(self.ticks, self.time, self.motion, cells, self.force, *at_cylinders)
         fill_measurement(self._seen, now)
         self._sampled = now.sampled

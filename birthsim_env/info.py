@@ -6,7 +6,7 @@ import numpy as np
 
 from birthsim_env.loop.rows import Signals, World
 from birthsim_env.loop.signals import compliant_offset
-from birthsim_env.physics import air, control_model
+from birthsim_env.physics import air, control_model, tubes
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
@@ -80,7 +80,9 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
         )
         info.supply_flow[i] = 0.0
         for k in range(4):
-            inflow, _ = air.flows_of(state, p, i, k)
+            pressure, temperature = state[at.PRESSURES[k], i], state[at.TEMPERATURES[k], i]
+            end, coldness = tubes.at_valve(p, i, world.at_valve[k, i], pressure, temperature)
+            inflow, _ = air.orifice_flows(p, i, k, end, state[at.SPOOLS[k], i], 1.0 / end, coldness)
             info.supply_flow[i] += max(inflow, 0.0)
     _describe_costs(world, info, n)
 

@@ -210,6 +210,7 @@ class Simulation(Parts):
             self.action = np.zeros((actuation.size, lanes))
         world = [(plant.lane_parameters, 0), (plant.state, at.STATE), (self.impacts, at.IMPACT), (self._motion, at.MOTION)]
         world += [(self._force, at.FORCE), (self._since, at.SINCE_JUMP), (self._tick, at.TICK)]
+        world += [(self._at_valves, at.AT_VALVE)]
         seen = [(self._seen, 0), (self.action, at.ACTION), (self._openings, at.OPENING)]
         if actuation.memory_names:
             # A user's own actuation is asked what it shows; a compiled one writes it.

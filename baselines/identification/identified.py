@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
+import numpy as np
 import tomli_w
 
 from baselines.identification.certainty import NORMAL, Certainty, certainty_of
@@ -11,11 +12,12 @@ from baselines.identification.estimate import Fit, Tick, fit, refine
 from baselines.identification.force_offset import ForceOffset, force_offset
 from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY, FreeParameter
 from baselines.identification.log_columns import CHAMBERS
-from baselines.identification.noise import guessed_noise
+from baselines.identification.noise import LEAST, guessed_noise, noise_of
 from baselines.identification.starts import Noise
 from baselines.identification.trial import Trial
 from birthsim_env.files import write_text
 from birthsim_env.parts.drawn.randomization import documented_ranges
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 
 
@@ -64,6 +66,8 @@ class Identified:
         What of the log was left out, a line each.
     pull : ForceOffset
         A constant force that the log lacks.
+    left_over : array (4,)
+        Residuals of each chamber's pressures over the noise that third differences show.
 
     Examples
     --------
@@ -82,6 +86,7 @@ class Identified:
     quick_noise: Noise
     notes: tuple[str, ...]
     pull: ForceOffset
+    left_over: Array
 
     @property
     def misfit(self) -> tuple[float, float]:
@@ -96,10 +101,10 @@ class Identified:
         lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
         if max(pressure, position) > MISFIT:
             lines.append(
-                "the model leaves more than noise: hands, an offset of the force sensor, leaks or play that it does not know; "
-                "see the residuals"
+                "the model leaves more than noise: hands, an offset of the force sensor, leaks, play or a curve of the valves "
+                "that it does not know; see the residuals"
             )
-        lines += self._causes()
+        lines += [*self._causes(), *self._unlike_valves()]
         if not self.fit.ended:
             lines.append("the search took all the evaluations that it may make, and may end before the best parameters")
         for row in self.rows:
@@ -129,6 +134,18 @@ class Identified:
                 )
         return lines
 
+    def _unlike_valves(self) -> list[str]:
+        """A chamber of whose pressure the fit leaves more than of the others', in a line."""
+        left = self.left_over
+        k = int(np.argmax(left))
+        if left[k] < max(UNLIKE * float(np.median(left)), MISFIT):
+            return []
+        name = CHAMBERS[k]
+        return [
+            f"pressures_{name} fit worse than the others', {left[k]:.2f} of their noise: a valve unlike "
+            f"the others ([valve_{name.lower()}]), a leak, a cell that errs; what all valves share may then be wrong too"
+        ]
+
     def write(self, path: Path, source: str) -> None:
         """Write the rig as TOML; its head says what is from the log ``source`` and what is not."""
         head = [f"Identified by birthsim identify from {source}.", *self.notes, *self.words()]
@@ -143,6 +160,9 @@ swing, and so do those with a later tracker (``birthsim study wide-rigs``)."""
 
 MISFIT = 1.1
 """Residuals so many times larger than the noise are named."""
+
+UNLIKE = 1.25
+"""A chamber is named whose residuals, over its noise, are so many times the median of all four; assumed."""
 
 BIASED, LEAST_BIAS = 3.0, 5e3
 """Standard deviations and Pa from which the bias of a cell is named."""
@@ -182,7 +202,16 @@ def identify(
     changes = {row.name: row.value for row in rows if row.determined}
     noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
     rig, quick = owner.replace({**changes, **noise}), guessed_noise(trial)
-    return Identified(tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull)
+    return Identified(tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left_over(last, trial))
+
+
+def left_over(found: Fit, trial: Trial) -> Array:
+    """RMS of the residuals of each chamber's pressures over its own noise, (4,)."""
+    residual, windows = found.problem.settled(found.theta)[1], found.problem.windows
+    pressures = residual[:, : 4 * windows.length].reshape(len(residual), -1, 4) * found.problem.noise.pressure
+    counted = np.sum(np.broadcast_to(windows.pressure_weights**2, pressures.shape), axis=(0, 1))
+    sizes = np.sqrt(np.sum(pressures**2, axis=(0, 1)) / np.maximum(counted, 1.0))
+    return np.array([size / max(noise_of(own[None]), LEAST.pressure) for size, own in zip(sizes, trial.pressures, strict=True)])
 
 
 def _latency(one: FreeParameter, period: float, middle: float, deviation: float) -> tuple[float, float, float]:

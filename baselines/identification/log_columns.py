@@ -29,7 +29,12 @@ COLUMNS = {
 }
 """What a log holds; forces may be missing."""
 
+PISTONS = ("piston_y1", "piston_y2")
+"""Positions of both pistons from mid stroke, m, by encoders: they may stand in place of ``POSITIONS``."""
+
 UNITS = {name: column.unit for name, column in COLUMNS.items()}
+COUNTED = {name: unit for name, unit in UNITS.items() if name not in POSITIONS} | dict.fromkeys(PISTONS, "m")
+"""What is read of a log of a rig with encoders."""
 NEEDED = tuple(name for name in COLUMNS if name not in FORCES)
 
 RECORDED = ("scenario_force", "drag_force")
@@ -48,11 +53,12 @@ class LogOptions:
 
 
 def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]]:
-    """The file as errors name it, and the columns ``UNITS`` of a log (T,) in SI; forces are 0 where the log has none.
+    """The file as errors name it, and the columns ``UNITS`` or ``COUNTED`` of a log (T,) in SI; forces are 0 where it has none.
 
     Warns of what is not used, and of a log without forces. ``ValueError`` names what is missing, or cannot be used.
     """
-    mapping = mapping_of("--columns ", options.columns, list(UNITS)) if options.columns else {}
+    counted = any(name in options.columns for name in PISTONS)
+    mapping = mapping_of("--columns ", options.columns, list(COUNTED if counted else UNITS)) if options.columns else {}
     for name, column in mapping.items():
         if column == NOTHING and name not in FORCES:
             raise ValueError(f"--columns {name}={NOTHING}; allowed: a column, and {NOTHING} for {', '.join(FORCES)} only")
@@ -61,11 +67,16 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
         raise ValueError(f"{table.source} has no heading; allowed: a line that names {', '.join(NEEDED)}, then numbers")
     pairs = {name: [f"{name}_{axis}" for axis in "xy"] for name in RECORDED}
     recorded = {column: "N" for pair in pairs.values() for column in pair if set(pair) <= set(table.columns)}
-    chosen = Selection(table, UNITS, mapping, OTHERS)
+    units = UNITS
+    chosen = Selection(table, units, mapping, OTHERS)
+    if counted or (not any(name in chosen.used for name in POSITIONS) and set(PISTONS) <= set(table.columns)):
+        units = COUNTED
+        chosen = Selection(table, units, mapping, OTHERS)
     if not any(name in chosen.used or name in mapping for name in FORCES):
-        chosen = Selection(table, UNITS | recorded, mapping, OTHERS)
-    chosen.check(NEEDED)
-    found = {name: chosen.values(name) for name in NEEDED}
+        chosen = Selection(table, units | recorded, mapping, OTHERS)
+    needed = [name for name in units if name not in FORCES]
+    chosen.check(needed)
+    found = {name: chosen.values(name) for name in needed}
     if not table.units.get(chosen.used["time"]) and _counts_rows(found["time"]):
         raise ValueError(
             f"{table.source} has a row every 1 s; allowed: a row every 0.25 to 10 ms, as often as the valves are commanded; it "

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 from tqdm import tqdm
@@ -15,6 +15,7 @@ from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log_columns import LogOptions
 from baselines.identification.log_file import read_trial, write_trial
+from baselines.identification.valve_table import fit_valve_table
 from baselines.logs.writing import WRITERS
 from baselines.named import make_controller
 from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Configured, RigFile, Seed, number, whole
@@ -24,6 +25,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 ONLY_WITH = {
     **{"duration": "propose", "controller": "simulate", "sensors": "simulate"},
     **dict.fromkeys(("report", "columns", "skip", "decimal_comma"), "log"),
+    "valve": "valve_table",
 }
 """Option -> the one of log, propose and simulate that it belongs to."""
 
@@ -46,6 +48,10 @@ class Settings(Configured):
     """Write an experiment as CSV: target, and openings to add."""
     simulate: Annotated[Path | None, Parameter(metavar="PLAN")] = None
     """Run an experiment on the simulator and write its log."""
+    valve_table: Annotated[Path | None, Parameter(metavar="TABLE")] = None
+    """Fit the curve of the valves to a table of opening (-1 to 1) and flow."""
+    valve: Literal["P1", "N1", "P2", "N2"] | None = None
+    """The chamber whose valve alone the table is of."""
     out: Path | None = None
     """The rig, .toml; with --simulate the log, .csv, .parquet or .mcap."""
     report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
@@ -63,14 +69,16 @@ class Settings(Configured):
 
 def main(settings: Settings) -> None:
     """Propose, simulate or identify."""
-    asked = [name for name in ("log", "propose", "simulate") if getattr(settings, name) is not None]
+    asked = [name for name in ("log", "propose", "simulate", "valve_table") if getattr(settings, name) is not None]
     if len(asked) != 1:
-        raise ValueError(f"{' and '.join(asked) or 'nothing'} given; allowed: one of LOG, --propose PLAN, --simulate PLAN")
+        given = " and ".join(name.replace("_", "-") for name in asked) or "nothing"
+        raise ValueError(f"{given} given; allowed: one of LOG, --propose PLAN, --simulate PLAN, --valve-table TABLE")
     for name, needed in ONLY_WITH.items():
         value = getattr(settings, name)
         if value is not None and value is not False and asked != [needed]:
             option = name.replace("_", "-")
-            raise ValueError(f"--{option} is given; allowed with {'LOG' if needed == 'log' else f'--{needed}'} only")
+            owner = "LOG" if needed == "log" else f"--{needed.replace('_', '-')}"
+            raise ValueError(f"--{option} is given; allowed with {owner} only")
     rig = load_parameters(settings.parameters)
     if settings.log is not None:
         _from_log(settings, settings.log, rig)
@@ -78,6 +86,8 @@ def main(settings: Settings) -> None:
         _propose(settings, settings.propose, rig)
     elif settings.simulate is not None:
         _simulate(settings, settings.simulate, rig)
+    elif settings.valve_table is not None:
+        _from_valve_table(settings, settings.valve_table, rig)
 
 
 def _propose(settings: Settings, path: Path, rig: Parameters) -> None:
@@ -99,6 +109,14 @@ def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:
         trial = run_plan(plan, [rig], law, settings.sensors or "lab", settings.seed, tick)[0]
     write_trial(trial, out, rig)
     print(f"written to {out}: {len(trial.times)} rows, {trial.times[-1] - trial.times[0]:.4g} s")
+
+
+def _from_valve_table(settings: Settings, table: Path, rig: Parameters) -> None:
+    out = _out(settings, (".toml",))
+    found = fit_valve_table(table)
+    rig.replace(found.changes(rig, settings.valve or "")).to_toml(out)
+    print("\n".join(found.words()))
+    print(f"written to {out}: the valve of {settings.valve or 'each chamber'}")
 
 
 def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:

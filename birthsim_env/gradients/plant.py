@@ -37,7 +37,12 @@ def require_plain(plant: Plant) -> None:
     """Raise ``ValueError`` for a rig whose derivatives are not known, by name."""
     p, names = plant.lane_parameters, []
     if not options.are_off(p):
-        names += ["air.supply_conductance", "chambers.tube_length", "mechanics.mode_frequency"]
+        names += [
+            "air.supply_conductance",
+            "chambers.tube_length",
+            "mechanics.mode_frequency",
+            "friction.law with the choice 'gms'",
+        ]
     if not spools.are_perfect(p):
         names += ["valves.hysteresis", "valves.opening_limit"]
     if names:

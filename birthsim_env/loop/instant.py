@@ -18,6 +18,7 @@ class Instant:
         self.parameters, self.plant = parameters, Plant(parameters, num_envs)
         self._tick, self._since = np.zeros((1, num_envs)), np.zeros((1, num_envs))
         self._motion, self._force = np.zeros((4, num_envs)), np.zeros((2, num_envs))
+        self._at_valves: Array = np.zeros((4, num_envs))
         self.impacts: Array = np.zeros((2, num_envs))
         self._openings: Array = np.zeros((4, num_envs))
         self._seen: Array = np.zeros((at.ASKED, num_envs))

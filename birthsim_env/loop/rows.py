@@ -24,6 +24,7 @@ class World(Rows):
     force = rows("force_x force_y", "N", "force of the hand, true")
     since_jump = row("s", "since force or stiffness setpoint jumped")
     tick = row("1", "control periods since the episode began")
+    at_valve = rows("valve_P1 valve_N1 valve_P2 valve_N2", "Pa", "of a chamber's tube, at the valve's end; without, none")
 
 
 class Feedforward(Rows):
@@ -67,7 +68,7 @@ class Seen(Signals):
 
 
 STATE, IMPACT, MOTION, FORCE = (one.first for one in (World.state, World.impact, World.motion, World.force))
-SINCE_JUMP, TICK, WORLD = World.since_jump.first, World.tick.first, World.size
+SINCE_JUMP, TICK, AT_VALVE, WORLD = World.since_jump.first, World.tick.first, World.at_valve.first, World.size
 TIME, POSITION, ACCELERATION, PRESSURE = (one.first for one in (Seen.time, Seen.position, Seen.acceleration, Seen.pressure))
 REFERENCE = Seen.reference.first
 ASKED, FEEDFORWARD, DAMPING, ACTION = (one.first for one in (Seen.asked, Seen.feedforward, Seen.damping_factor, Seen.action))

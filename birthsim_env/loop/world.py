@@ -13,7 +13,7 @@ from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, r
 from birthsim_env.physics.equilibrium import balance
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.options import FURTHER, SCRATCH
+from birthsim_env.physics.options import FLOWS, FURTHER, SCRATCH, TUBES
 
 
 class Clock(Numbers):
@@ -76,6 +76,7 @@ def _optional_plant(world: World, seen: Seen, memory: FurtherStates, clock: Cloc
     options.integrate(x, further, u, world.force, p, steps, clock.period / steps, world.impact, own, n)
     _tick(world, seen, clock.period, n)
     options.port_motion(x[:, :n], further[:, :n], p[:, :n], world.motion.rows[:, :n])
+    dynamics.copy(further[TUBES:FLOWS], world.at_valve, n)
     return 0
 
 
@@ -166,6 +167,7 @@ def _rest(world: World, seen: int, memory: FurtherStates, constants: int, tables
         for i in range(n):
             memory.further[k, i] = further[k, i] if start.how[i] >= 0.0 else memory.further[k, i]
     options.port_motion(world.state[:, :n], memory.further[:, :n], p[:, :n], world.motion.rows[:, :n])
+    dynamics.copy(memory.further[TUBES:FLOWS], world.at_valve, n)
     return 0
 
 

@@ -14,7 +14,7 @@ from birthsim_env.loop.loop import Loop, Place
 from birthsim_env.loop.rows import ACTION, OPENING, STATE, Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
-from birthsim_env.physics import valves
+from birthsim_env.physics import tubes, valves
 from birthsim_env.physics.air import driving_flows, valve_of
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
@@ -112,9 +112,11 @@ def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: i
         full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * p[at.RHO0, i] * math.sqrt(p[at.COLDNESS, i])
         for cylinder in range(2):
             pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
-            fill_p, drain_p = driving_flows(p, i, state[pp, i], 1.0 / state[pp, i], p[at.T0, i] / state[tp, i])
-            fill_n, drain_n = driving_flows(p, i, state[pn, i], 1.0 / state[pn, i], p[at.T0, i] / state[tn, i])
             chamber_p, chamber_n = (0, 1) if cylinder == 0 else (2, 3)
+            end_p, coldness_p = tubes.at_valve(p, i, world.at_valve[chamber_p, i], state[pp, i], state[tp, i])
+            end_n, coldness_n = tubes.at_valve(p, i, world.at_valve[chamber_n, i], state[pn, i], state[tn, i])
+            fill_p, drain_p = driving_flows(p, i, end_p, 1.0 / end_p, coldness_p)
+            fill_n, drain_n = driving_flows(p, i, end_n, 1.0 / end_n, coldness_n)
             if one_valve:
                 half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
                 y = max(-0.95 * half, min(0.95 * half, state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]))

@@ -61,21 +61,6 @@ def orifice_flows(
 
 
 @helper
-def flows_of(x: Array, p: Array, i: int, k: int) -> tuple[float, float]:
-    """``orifice_flows`` of chamber ``k`` by the state alone."""
-    pressure, temperature = x[at.PP1 + 2 * k, i], x[at.TP1 + 2 * k, i]
-    return orifice_flows(p, i, k, pressure, x[at.S1P + k, i], 1.0 / pressure, p[at.T0, i] / temperature)
-
-
-@helper
-def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
-    """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
-    for i in range(state.shape[1]):
-        for k in range(4):
-            flows[k, i], flows[4 + k, i] = flows_of(state, parameters, i, k)
-
-
-@helper
 def exchange(
     p: Array,
     i: int,

@@ -14,20 +14,23 @@ three rows an edge. A measured table is fitted (``baselines.identification.valve
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from birthsim_env.physics.compiled.compilation import helper
 
 
 class Edge(NamedTuple):
-    """A metering edge, of which tau (``slope`` - ``bend`` tau) is open, in parts of the valve's conductance.
-
-    With the edge's own share e of it, ``slope`` is e (1 + c)/(1 - d), and ``bend`` is e c/(1 - d)^2; ``overlap`` is d.
-    """
+    """A metering edge, of which tau (``slope`` - ``bend`` tau) is open, in parts of the valve's conductance (``edge_of``)."""
 
     overlap: float
     slope: float
     bend: float
+
+
+def edge_of(overlap: Any, curvature: Any, share: Any) -> Edge:
+    """The edge with overlap d, curvature c and its own ``share`` of the valve's conductance; of arrays, edges side by side."""
+    reach = 1.0 - overlap
+    return Edge(overlap, share * (1.0 + curvature) / reach, share * curvature / (reach * reach))
 
 
 @helper
@@ -62,8 +65,8 @@ def opening_of(part: float, edge: Edge, crossing: float) -> float:
     """Opening in [0, 1] at which an edge opens a ``part``, at least 0, of the valve's conductance; 1 where it cannot.
 
     Below ``crossing`` not all of the overlap is added, so that a wish about zero does not throw the spool from side to side.
-    What then leaves the valve is less than the wish, and catches up with it on the way to ``crossing``: the sooner, the more
-    steeply, which loops answer by chatter. In proportion, as a ramp, the spool would turn five times as often at the same error.
+    What then leaves the valve is less than the wish, and catches up with it on the way to ``crossing``: the later, the more
+    steeply, which loops answer by chatter. A ramp catches up later than this parabola.
     """
     beyond = _root(min(part, largest_part(edge)), edge.slope, edge.bend)
     return min(beyond + edge.overlap * _crossed(part, crossing), 1.0)

@@ -31,6 +31,13 @@ def coulomb_level(x: Array, p: Array, i: int, cylinder: int) -> float:
 
 
 @helper
+def weakness_of(x: Array, p: Array, i: int, cylinder: int) -> float:
+    """1/G(v) of piston 0 or 1, 1/N."""
+    fc = coulomb_level(x, p, i, cylinder)
+    return friction.inverse_level(x[at.V1 + 2 * cylinder, i], fc, p[at.STATIC_RATIO, i] * fc, p[at.STRIBECK, i])
+
+
+@helper
 def coulomb_levels(state: Array, parameters: Array, levels: Array) -> None:
     """Writes ``coulomb_level`` of both pistons in states (18, N) of rigs (PARAMETERS, N), N, (2, N)."""
     for cylinder in range(2):
@@ -43,8 +50,8 @@ def piston_friction(x: Array, p: Array, i: int, cylinder: int) -> tuple[float, f
     """Friction on rod 0 or 1, N, positive along the motion that it holds back, and the rate of its bristle, m/s."""
     v, z, s0 = x[at.V1 + 2 * cylinder, i], x[at.Z1 + cylinder, i], p[at.S0, i]
     fc, fv = coulomb_level(x, p, i, cylinder), (p[at.FV1, i] if cylinder == 0 else p[at.FV2, i])
-    weakness = friction.inverse_level(v, fc, p[at.STATIC_RATIO, i] * fc, p[at.STRIBECK, i])
-    is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
+    weakness = weakness_of(x, p, i, cylinder)
+    is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.BRISTLED, i] > 0.5
     rate = friction.bristle_rate_by_law(v, z, weakness, s0, is_lugre, p[at.BREAKAWAY, i], p[at.STEEPNESS, i])
     held = friction.lugre_force(v, z, rate, s0, p[at.S1, i], fv)
     sliding = friction.coulomb_force(v, fc, fv, p[at.SIGN_SLOPE, i])
@@ -57,13 +64,22 @@ def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int, togeth
 
     ``together`` is that of ``air.air_rates``.
     """
+    friction1, dz1 = piston_friction(x, p, i, 0)
+    friction2, dz2 = piston_friction(x, p, i, 1)
+    dx[at.Z1], dx[at.Z2] = dz1, dz2
+    rates_under(x, u, f, p, dx, i, together, friction1, friction2)
+
+
+@helper
+def rates_under(
+    x: Array, u: Array, f: Array, p: Array, dx: Array, i: int, together: int, friction1: float, friction2: float
+) -> None:
+    """``lane_rates`` but for the bristles, for given friction on both rods, N."""
     y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
     )
 
-    friction1, dz1 = piston_friction(x, p, i, 0)
-    friction2, dz2 = piston_friction(x, p, i, 1)
     force1 = (
         mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
         - friction1
@@ -80,8 +96,6 @@ def lane_rates(x: Array, u: Array, f: Array, p: Array, dx: Array, i: int, togeth
     dx[at.V1] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
     dx[at.Y2] = v2
     dx[at.V2] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
-    dx[at.Z1], dx[at.Z2] = dz1, dz2
-
     air.air_rates(x, p, dx, i, together)
     dx[at.S1P] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
     dx[at.S1N] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]

@@ -33,7 +33,7 @@ def balance(state: Array, stiffness: Array, p: Array) -> None:
             half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
             y = y1 if cylinder == 0 else y2
             speed = state[v, i] if abs(state[v, i]) > REST_SPEED else 0.0
-            has_bristle = p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
+            has_bristle = p[at.BRISTLED, i] > 0.5
             weight = weight1 if cylinder == 0 else weight2
             length_p, length_n = half + y, half - y
             low, high = p[at.ATMOSPHERE, i], p[at.SOURCE, i]

@@ -1,20 +1,22 @@
-"""Options of the plant: a supply behind a line, tubes between valves and chambers, a handle on a flexible structure.
+"""Options of the plant: supply behind a line, tubes between valves and chambers, flexible structure, generalised Maxwell slip.
 
-Each is off where its parameter is 0 (``supply_conductance``, ``tube_length``, ``mode_frequency``). Plants without any run the
-kernels of ``dynamics``, which know none of them. With an option the state has further rows:
+The first three are off where their parameter is 0 (``supply_conductance``, ``tube_length``, ``mode_frequency``), the last where
+another ``law`` of friction is chosen. Plants without any run the kernels of ``dynamics``, which know none of them. With an
+option the state has further rows:
 
 - the pressure Ps in a reservoir of volume V, isothermal, which the valves draw from and an ISO 6358 line fills from the source:
   dPs/dt = r T (q(source, Ps) - sum of the valves' supply flows) / V. The line's critical ratio is the valves'.
-- flows into and out of each chamber, which follow those of the valve with a lag of the time that sound takes through the tube:
-  dq/dt = (q_valve - q) c / L. It stands for the delay L/c of Richer and Hurmuzlu 2000; their attenuation is left out.
+- the pressure at the valve's end of each tube, and the flow through it into the chamber (``tubes``).
 - position and velocity of the handle, a part ``mode_mass_fraction`` of the mass that hangs on the linkage's end by spring and
   damper: m_h dvh/dt = Fu - k (xh - xc) - d (vh - vc), k = m_h w^2, d = 2 zeta w m_h, w = 2 pi f. The handle's position is
   counted from where its weight holds it. Hand and tracker are at the handle.
+- the deflections of the elements of ``maxwell_slip``, m, and the way in which each slips; of a piston that has them, the
+  bristle of the state is their mean, sum c_i z_i.
 """
 
 import numpy as np
 
-from birthsim_env.physics import air, dynamics, valves
+from birthsim_env.physics import air, dynamics, maxwell_slip, tubes, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -22,22 +24,35 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
 
-RESERVOIR, HANDLE, FLOWS = 0, 1, 5
-"""Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; flows of chambers P1, N1, P2, N2, kg/s, four
-from the supply and four to the atmosphere."""
-FURTHER = 13
+RESERVOIR, HANDLE, TUBES, FLOWS, BRISTLES = 0, 1, 5, 9, 13
+"""Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; of the tubes of chambers P1, N1, P2, N2 four
+pressures at the valves' ends, Pa, and four flows into the chambers, kg/s; what ``maxwell_slip`` has of both pistons."""
+FURTHER = BRISTLES + maxwell_slip.ROWS
 ALL = at.STATES + FURTHER
-SCRATCH = 4 * ALL + 6 + at.PARAMETERS
+SCRATCH = 4 * ALL + 8 + at.PARAMETERS + tubes.CONSTANTS
 
 
 def are_off(parameters: Array) -> bool:
     """Whether no lane has any of the options, (PARAMETERS, N)."""
-    return not parameters[[at.LINE, at.MODE_RATE, at.TUBE_RATE]].any()
+    return not parameters[[at.LINE, at.MODE_RATE, at.TUBE_LENGTH, at.GMS]].any()
 
 
 @helper
-def alter(p: Array, own: Array, n: int) -> None:
-    """Fill ``own`` (PARAMETERS, n), with which ``dynamics`` computes: without the handle's mass, but with all of the weight."""
+def moving_rows(p: Array, n: int) -> int:
+    """How many of ``ALL`` rows have rates in ``n`` lanes: those of elements only where a lane has them, and never the last."""
+    for i in range(n):
+        if p[at.GMS, i] > 0.5:
+            return at.STATES + BRISTLES + maxwell_slip.MOVING
+    return at.STATES + BRISTLES
+
+
+@helper
+def alter(p: Array, own: Array, tube: Array, n: int) -> None:
+    """Fill ``own`` (PARAMETERS, n), with which ``dynamics`` computes: without the handle's mass, but with all of the weight.
+
+    ``tube`` (tubes.CONSTANTS, n) gets what the tubes' rates are computed from.
+    """
+    tubes.fill_constants(p, tube, n)
     for row in range(at.PARAMETERS):
         for i in range(n):
             own[row, i] = p[row, i]
@@ -49,9 +64,10 @@ def alter(p: Array, own: Array, n: int) -> None:
 
 
 @helper
-def lagged_chamber(
+def tubed_chamber(
     x: Array,
     p: Array,
+    tube: Array,
     dx: Array,
     i: int,
     chamber: int,
@@ -63,12 +79,18 @@ def lagged_chamber(
     length: float,
     length_rate: float,
 ) -> float:
-    """Rates of a chamber behind a tube, where there is one; returns what its valve draws from the supply, kg/s."""
-    supplied, exhausted = air.flows_of(x, p, i, chamber)
-    row = at.STATES + FLOWS + chamber
-    rate = p[at.TUBE_RATE, i]
-    dx[row], dx[row + 4] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
-    if rate > 0.0:
+    """Rates of a tube and of the chamber behind it, where there is one; returns what its valve draws from the supply, kg/s."""
+    row, through, has_tube = at.STATES + TUBES + chamber, at.STATES + FLOWS + chamber, p[at.TUBE_LENGTH, i] > 0.0
+    end, outer = tubes.at_valve(p, i, x[row, i], x[pressure, i], x[temperature, i])
+    supplied, exhausted = air.orifice_flows(p, i, chamber, end, x[at.S1P + chamber, i], 1.0 / end, outer)
+    flow = x[through, i]
+    coldness = outer if end > x[pressure, i] else p[at.T0, i] / x[temperature, i]
+    inertance, viscous = tube[tubes.INERTANCE, i], tube[tubes.VISCOUS, i]
+    resistance, critical = tube[tubes.RESISTANCE, i], tube[tubes.CRITICAL, i]
+    pushed = tubes.flow_rate(end, x[pressure, i], flow, coldness, inertance, viscous, resistance, critical)
+    dx[row] = tube[tubes.GAIN, i] * (supplied - exhausted - flow) if has_tube else 0.0
+    dx[through] = pushed if has_tube else 0.0
+    if has_tube:
         inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
         dx[pressure], dx[temperature] = air.exchange(
             p,
@@ -80,18 +102,21 @@ def lagged_chamber(
             p[perimeter, i],
             length,
             length_rate,
-            x[row, i],
-            x[row + 4, i],
+            flow,
+            0.0,
             inverse,
         )
     return supplied
 
 
 @helper
-def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pull: Array, dx: Array, n: int) -> None:
-    """dx/dt of ``n`` lanes: state (ALL, n), openings (4, n), user force (2, n), parameters from ``alter``.
+def right_hand_side(
+    x: Array, u: Array, f: Array, own: Array, tube: Array, motion: Array, pull: Array, rubbing: Array, dx: Array, n: int
+) -> None:
+    """dx/dt of ``n`` lanes: state (ALL, n), openings (4, n), user force (2, n), ``own`` and ``tube`` from ``alter``.
 
-    Scratch: ``motion`` (4, n) of the linkage's end, and ``pull`` (2, n), the force on it.
+    Scratch: ``motion`` (4, n) of the linkage's end, and ``pull`` (2, n), the force on it; ``rubbing`` (2, n), friction. Rates
+    of elements stay as they are, zero, in lanes without.
     """
     end_effector_motion(x[: at.STATES, :n], own[:, :n], motion[:, :n])
     for i in range(n):
@@ -105,16 +130,24 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
             pull[axis, i] = spring if bends else f[axis, i]
             dx[place, i] = x[speed, i]
             dx[speed, i] = (f[axis, i] - spring) / mass if bends else 0.0
-    dynamics.right_hand_side(x, u, pull, own, dx, n)
+    for i in range(n):
+        rubbing[0, i], dx[at.Z1, i] = dynamics.piston_friction(x, own, i, 0)
+        rubbing[1, i], dx[at.Z2, i] = dynamics.piston_friction(x, own, i, 1)
+    for i in range(n):
+        if own[at.GMS, i] > 0.5:
+            rubbing[0, i], dx[at.Z1, i] = maxwell_slip.piston_friction(x, own, dx, i, 0, at.STATES + BRISTLES)
+            rubbing[1, i], dx[at.Z2, i] = maxwell_slip.piston_friction(x, own, dx, i, 1, at.STATES + BRISTLES)
+    for i in range(n):
+        dynamics.rates_under(x, u, pull, own, dx[:, i], i, 1, rubbing[0, i], rubbing[1, i])
     for i in range(n):
         y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
         half1, half2, rates = own[at.HALF_L1, i], own[at.HALF_L2, i], dx[:, i]
-        drawn = lagged_chamber(
-            x, own, rates, i, 0, at.PP1, at.TP1, at.TN1, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
-        ) + lagged_chamber(x, own, rates, i, 1, at.PN1, at.TN1, at.TP1, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
-        drawn += lagged_chamber(
-            x, own, rates, i, 2, at.PP2, at.TP2, at.TN2, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
-        ) + lagged_chamber(x, own, rates, i, 3, at.PN2, at.TN2, at.TP2, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
+        drawn = tubed_chamber(
+            x, own, tube, rates, i, 0, at.PP1, at.TP1, at.TN1, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
+        ) + tubed_chamber(x, own, tube, rates, i, 1, at.PN1, at.TN1, at.TP1, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
+        drawn += tubed_chamber(
+            x, own, tube, rates, i, 2, at.PP2, at.TP2, at.TN2, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
+        ) + tubed_chamber(x, own, tube, rates, i, 3, at.PN2, at.TN2, at.TP2, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
         source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
         filled = own[at.LINE, i] * valves.driving_flow(
             source,
@@ -132,9 +165,9 @@ def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pul
 
 
 @helper
-def combine(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
-    """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
-    for row in range(ALL):
+def combine(x: Array, dx: Array, total: Array, trial: Array, rows: int, n: int, weight: float, ahead: float) -> None:
+    """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx, of the first ``rows``."""
+    for row in range(rows):
         for i in range(n):
             total[row, i] += weight * dx[row, i]
             trial[row, i] = x[row, i] + ahead * dx[row, i]
@@ -149,16 +182,21 @@ def integrate(
     ``scratch`` is (SCRATCH, BLOCK).
     """
     x, dx, total, trial = scratch[:ALL], scratch[ALL : 2 * ALL], scratch[2 * ALL : 3 * ALL], scratch[3 * ALL : 4 * ALL]
-    motion, pull, own = scratch[4 * ALL : 4 * ALL + 4], scratch[4 * ALL + 4 : 4 * ALL + 6], scratch[4 * ALL + 6 :]
-    alter(p, own, n)
+    motion, pull = scratch[4 * ALL : 4 * ALL + 4], scratch[4 * ALL + 4 : 4 * ALL + 6]
+    rubbing, more = scratch[4 * ALL + 6 : 4 * ALL + 8], scratch[4 * ALL + 8 :]
+    own, tube = more[: at.PARAMETERS], more[at.PARAMETERS :]
+    alter(p, own, tube, n)
+    rows = moving_rows(p, n)
+    dx[at.STATES + BRISTLES :] = 0.0
     dynamics.copy(state, x[: at.STATES], n)
     dynamics.copy(further, x[at.STATES :], n)
     for _ in range(steps):
         dynamics.copy(x, total, n)
         dynamics.copy(x, trial, n)
         for k in range(STAGES):
-            right_hand_side(trial, u, f, own, motion, pull, dx, n)
-            combine(x, dx, total, trial, n, weight_of(k, step), ahead_of(k, step))
+            right_hand_side(trial, u, f, own, tube, motion, pull, rubbing, dx, n)
+            combine(x, dx, total, trial, rows, n, weight_of(k, step), ahead_of(k, step))
+        maxwell_slip.switch_elements(x, total, own, at.STATES + BRISTLES, step, n)
         dynamics.copy(total, x, n)
         dynamics.record_impacts(x, p, impacts, n)
     dynamics.settle(x, n)
@@ -205,12 +243,26 @@ def port_motion(state: Array, further: Array, p: Array, motion: Array) -> None:
 
 
 @helper
+def mass_flows(state: Array, further: Array, parameters: Array, flows: Array) -> None:
+    """Writes the flows at the valves of chambers P1, N1, P2, N2: 0-3 from the supply, 4-7 to the atmosphere, kg/s, (8, N)."""
+    for k in range(4):
+        for i in range(state.shape[1]):
+            pressure, temperature = state[at.PRESSURES[k], i], state[at.TEMPERATURES[k], i]
+            end, coldness = tubes.at_valve(parameters, i, further[TUBES + k, i], pressure, temperature)
+            opening = state[at.SPOOLS[k], i]
+            flows[k, i], flows[4 + k, i] = air.orifice_flows(parameters, i, k, end, opening, 1.0 / end, coldness)
+
+
+@helper
 def rest(state: Array, parameters: Array, further: Array) -> None:
     """Writes the ``further`` rows (FURTHER, N) with which a state (18, N) begins, its supply that of the source.
 
-    The handle moves with the linkage, unbent, and what passes the valves passes the tubes.
+    The handle moves with the linkage, unbent, the air in the tubes stands still at the chambers' pressures,
+    and the elements of bristles have been loaded from rest.
     """
     for i in range(state.shape[1]):
         further[RESERVOIR, i] = parameters[at.SOURCE, i]
-    end_effector_motion(state, parameters, further[HANDLE:FLOWS])
-    air.mass_flows(state, parameters, further[FLOWS:])
+        for chamber in range(4):
+            further[TUBES + chamber, i], further[FLOWS + chamber, i] = state[at.PRESSURES[chamber], i], 0.0
+    end_effector_motion(state, parameters, further[HANDLE:TUBES])
+    maxwell_slip.rest(state, parameters, further[BRISTLES:])

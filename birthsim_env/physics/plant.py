@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from birthsim_env.physics import air, dynamics, options, spools
+from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
@@ -150,9 +150,10 @@ class Plant:
             options.advance(self.state, self.memory[4:], command, *how)
 
     def mass_flows(self) -> Array:
-        """Flows of chambers P1, N1, P2, N2 now, kg/s, (8, num_envs): rows 0-3 from the supply, 4-7 to the atmosphere."""
+        """Flows at the valves of chambers P1, N1, P2, N2 now, kg/s, (8, num_envs): rows 0-3 from the supply, 4-7 to the
+        atmosphere."""
         flows = np.empty((8, self.num_envs))
-        air.mass_flows(self.state, self.lane_parameters, flows)
+        options.mass_flows(self.state, self.memory[4:], self.lane_parameters, flows)
         return flows
 
     @property

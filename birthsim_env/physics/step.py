@@ -28,7 +28,10 @@ class Step(NamedTuple):
     Only the largest valves on the smallest chambers come near."""
 
     shortest_tube: float
-    """m. A shorter tube has the lag of one of this length."""
+    """m. The air of a shorter tube has the inertia of one of this length."""
+
+    fastest_tube: float
+    """1/s at most of the pressure at a tube's end behind an open valve and close to the pressure beyond it."""
 
 
-STEP = Step(1e-3 / 3, 4500.0, 3750.0, 6300.0, 6800.0, 0.07)
+STEP = Step(1e-3 / 3, 4500.0, 3750.0, 6300.0, 6800.0, 0.2, 4500.0)

@@ -74,7 +74,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
 
     # The code serves worn valves and tubes too, and a start that leaves what any of them remembers.
     worn, tubes = column.copy(), column.copy()
-    worn[at.PLAY], tubes[at.TUBE_RATE] = 0.01, 100.0
+    worn[at.PLAY], tubes[at.TUBE_LENGTH] = 0.01, 1.0
     learns = [LEARNING] if policies else []
     chosen = [*names("controller", listed=True), *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period

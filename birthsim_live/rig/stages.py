@@ -3,7 +3,8 @@
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import block
-from birthsim_env.physics import air, dynamics
+from birthsim_env.physics import air, dynamics, tubes
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -14,16 +15,17 @@ SHOWN = Info.size + INSIDE
 
 
 @helper
-def look_inside(x: Array, p: Array, rows: Array) -> None:
-    """Writes friction of pistons 1 and 2, N, and net flows into chambers P1, N1, P2, N2, kg/s, (INSIDE, N).
+def look_inside(x: Array, p: Array, ends: Array, rows: Array) -> None:
+    """Writes friction of pistons 1 and 2, N, and what the valves of chambers P1, N1, P2, N2 let in, kg/s, (INSIDE, N).
 
-    State ``x`` (18, N), parameters ``p`` (PARAMETERS, N).
+    State ``x`` (18, N), parameters ``p`` (PARAMETERS, N), pressures at the ``ends`` of tubes (4, N).
     """
     for i in range(x.shape[1]):
         rows[0, i], _ = dynamics.piston_friction(x, p, i, 0)
         rows[1, i], _ = dynamics.piston_friction(x, p, i, 1)
         for k in range(4):
-            supplied, exhausted = air.flows_of(x, p, i, k)
+            end, coldness = tubes.at_valve(p, i, ends[k, i], x[at.PRESSURES[k], i], x[at.TEMPERATURES[k], i])
+            supplied, exhausted = air.orifice_flows(p, i, k, end, x[at.SPOOLS[k], i], 1.0 / end, coldness)
             rows[2 + k, i] = supplied - exhausted
 
 
@@ -32,5 +34,5 @@ def show(world: World, seen: Seen, memory: int, constants: int, tables: int, lan
     """Writes the fields of ``info``, and below them those of ``look_inside``, into its memory (SHOWN, N)."""
     rows = block(memory, SHOWN)
     describe(world, seen, Info(rows[: Info.size]), n)
-    look_inside(world.state[:, :n], world.rig[:, :n], rows[Info.size :, :n])
+    look_inside(world.state[:, :n], world.rig[:, :n], world.at_valve[:, :n], rows[Info.size :, :n])
     return 0

@@ -4,8 +4,11 @@ import pytest
 from filelock import FileLock
 
 from birthsim_build.code.targets import HOST
+from birthsim_build.device import machine
+from birthsim_build.device.program import Pieces
 from lab.studies.targets.reference import PERIODS
 from lab.studies.targets.running import node_rows
+from tests.build.loops import every_function
 from tests.build.targets import BUILT, build, device, need_linker, need_program
 
 __all__ = ["device"]
@@ -33,6 +36,19 @@ def library(tmp_path_factory):
     if HOST is None:
         pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")
     return _once(tmp_path_factory, HOST, *BUILT)
+
+
+@pytest.fixture(scope="session")
+def cortex(tmp_path_factory):
+    return _once(tmp_path_factory, "cortex-m7", "--controller", "admittance-backstepping", "--sensors", "ideal", "lab")
+
+
+@pytest.fixture
+def in_one_code(monkeypatch):
+    """Programs have the code of all loops of ``tests.build.loops``, and rows for each, so that it is compiled once for all."""
+    own, functions = Pieces.functions.fget, every_function()
+    monkeypatch.setattr(Pieces, "functions", property(lambda pieces: sorted({*functions, *own(pieces)})))
+    monkeypatch.setattr(machine, "ROOM", 1024)
 
 
 @pytest.fixture

@@ -10,51 +10,26 @@ from birthsim_build.code.compiler import compile_object
 from birthsim_build.code.threads import RUNS
 from birthsim_build.device.beginning import beginning_with
 from birthsim_build.device.program import program_of
-from birthsim_env import Circle, ForceProfile, Parameters
-from birthsim_env.assembly import assemble
-from birthsim_env.episodes import Episodes
+from birthsim_env import Circle, ForceProfile
 from birthsim_env.loop.loop import Loop
-from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.scenarios import environment_id
-from birthsim_env.registry import names
+from tests.build.loops import BEGUN, begun
 from tests.build.targets import assert_fusing_changes_nothing, need_threads
 from tests.build.test_device import assert_equal, assert_same_run
 from tests.build.test_threads import assert_exact
 
 SEED = 2_200_000
 
-OPTIONS = Parameters().replace(
-    {
-        "air.supply_conductance": 1e-8,
-        "mechanics.mode_frequency": 20.0,
-        "chambers.tube_length": 1.0,
-        "valves.hysteresis": 0.02,
-        "electronics.acceleration_bandwidth": 50.0,
-    }
-)
-
-# Ideal and lab sensors in every scenario begin as the stored fingerprints do, which ``test_device`` has a device compute.
-CASES = {
-    **{f"{name} honest": (name, {"sensors": "honest"}) for name in names("scenario")},
-    "circle ideal": ("circle", {"sensors": "ideal"}),
-    **{hand: ("probe", {"user_force": hand}) for hand in ("sine", "noise", "guided")},
-    "options": ("circle", {"parameters": OPTIONS, "sensors": "lab"}),
-    "options, honest, no force sensor": ("forceps", {"parameters": OPTIONS, "sensors": "honest", "force_sensor": False}),
-    "sensors": ("probe", {"randomize": "sensors", "sensors": "honest"}),
-    "nothing drawn": ("descent", {"randomize": False}),
-    "two fields": ("vacuum", {"randomize": {"mechanics.mass": (2.0, 3.0), "cylinder1.piston_diameter": (0.031, 0.032)}}),
-    "contractions": ("probe", {"user_force": Contractions((-9.0, 9.0), 3, 1.3, (0, 9), (0.1, 0.9), 2.1)}),
-}
-
 
 def made(device, case, lanes, **more):
-    scenario, arguments = CASES[case]
+    scenario, arguments = BEGUN[case]
     given = {"randomize": True, **arguments, **more}
     return gymnasium.make_vec(environment_id(scenario), num_envs=lanes, device=device, **given)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.usefixtures("in_one_code")
+@pytest.mark.parametrize("case", BEGUN)
 def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
     envs = [made(where, case, 33, max_episode_steps=3) for where in ("cpu", device)]
     assert_same_run(*envs, 8, staggered=True)
@@ -65,6 +40,7 @@ def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 @pytest.mark.parametrize("lanes", [1, 1000])
 def test_many_and_one(lanes, device):
     assert_same_run(*(made(place, "circle honest", lanes, max_episode_steps=2) for place in ("cpu", device)), 4)
@@ -74,8 +50,7 @@ def test_many_and_one(lanes, device):
 def test_ptx_of_a_beginning_is_exact_and_alone(tmp_path):
     need_threads()
     for case in ("noise", "contractions", "options", "circle honest"):
-        scenario, arguments = CASES[case]
-        many, other = (Episodes(assemble(lanes, scenario, **{"randomize": True, **arguments})) for lanes in (3, 2))
+        many, other = (begun(case, lanes) for lanes in (3, 2))
         pieces = beginning_with(many)
         program = program_of(pieces, beginning_with(other), pieces.functions)
         compile_object(pieces.functions, "ptx", tmp_path / "code.o", threads=program.threads)
@@ -112,9 +87,8 @@ def test_what_no_device_draws_is_refused_by_name():
 
 @pytest.mark.parametrize("case", ["circle honest", "nothing drawn"])
 def test_stages_begin_a_block_as_a_simulation_does(case):
-    scenario, arguments = CASES[case]
     lanes = 5
-    episodes = Episodes(assemble(lanes, scenario, **{"randomize": True, **arguments}))
+    episodes = begun(case, lanes)
     pieces = beginning_with(episodes)
     numbers = np.arange(3, 3 + lanes)
     episodes.begin_first([SEED + lane for lane in range(lanes)], numbers)

@@ -78,17 +78,23 @@ def test_a_law_alone(rows_of, sensors):
     assert_same_bits(rows[:, OPENINGS], openings)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sensors", KINDS)
-def test_every_controller_alone_in_c(tmp_path, sensors):
+@pytest.fixture(scope="module")
+def laws(tmp_path_factory):
+    """The folder of a library with every controller."""
     need_linker()
     if HOST is None:
         pytest.skip("no shared library runs here; allowed: Linux on x86-64 or aarch64")
-    names = compiled_names(listed=True)
-    build(HOST, tmp_path, "--controller", *names, "--sensors", sensors)
-    for name in names:
+    folder = tmp_path_factory.mktemp("laws")
+    build(HOST, folder, "--controller", *compiled_names(listed=True), "--sensors", *KINDS)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", KINDS)
+def test_every_controller_alone_in_c(laws, sensors):
+    for name in compiled_names(listed=True):
         seen, openings = law_openings(name, sensors)
-        rows = library_rows(tmp_path, f"law_{identifier(name)}_{KINDS[sensors]}", PERIODS, as_inputs(seen))
+        rows = library_rows(laws, f"law_{identifier(name)}_{KINDS[sensors]}", PERIODS, as_inputs(seen))
         assert_same_bits(rows[:, OPENINGS], openings)
 
 
@@ -114,11 +120,10 @@ def test_a_law_alone_whose_sensors_fail(rows_of, sensors):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sensors", KINDS)
-def test_a_law_on_cortex_m7(tmp_path, sensors):
+def test_a_law_on_cortex_m7(cortex, sensors):
     need_emulator("cortex-m7")
-    build("cortex-m7", tmp_path, "--controller", LAW, "--sensors", sensors)
     seen, openings = law_openings(LAW, sensors)
-    rows = emulated_rows("cortex-m7", tmp_path, f"law_{identifier(LAW)}_{KINDS[sensors]}", PERIODS, seen)
+    rows = emulated_rows("cortex-m7", cortex, f"law_{identifier(LAW)}_{KINDS[sensors]}", PERIODS, seen)
     assert_same_bits(rows[:, OPENINGS], openings)
 
 
@@ -127,6 +132,7 @@ OPTIONS = {
     "all": {
         "air.supply_conductance": 6e-9, "air.supply_volume": 2e-3, "chambers.tube_length": 1, "mechanics.mode_frequency": 30,
     },
+    "seals": {"friction.law": "gms", "cylinder1.pressure_friction": 5e-6, "cylinder2.direction_asymmetry": 0.2},
 }  # fmt: skip
 
 

@@ -15,7 +15,8 @@ from baselines import evaluate, make_controller
 from baselines.controller import PlainController
 from birthsim_build.device import machine
 from birthsim_build.device.evaluation import evaluate_on
-from birthsim_env import ForceProfile, Parameters, StiffnessSchedule, Trajectory
+from birthsim_env import ForceProfile, Parameters, Trajectory
+from tests.build.loops import SOFT
 from tests.build.targets import imported, need_threads
 from tests.oracles.golden import fingerprints
 
@@ -65,6 +66,7 @@ def assert_same_run(here, there, steps, **options):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 @pytest.mark.parametrize(("mode", "staggered"), [("NextStep", False), ("NextStep", True), ("SameStep", True)])
 @pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v1", "honest"), (RESIDUAL, "lab")])
 def test_the_bits_of_the_native_environment(mode, staggered, name, sensors, device):
@@ -73,6 +75,7 @@ def test_the_bits_of_the_native_environment(mode, staggered, name, sensors, devi
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 def test_lanes_that_wait_begin_where_they_are_told(device):
     envs = [made(place, autoreset_mode="Disabled", max_episode_steps=2) for place in ("cpu", device)]
     mask = np.arange(7) % 2 == 0
@@ -86,19 +89,16 @@ def test_lanes_that_wait_begin_where_they_are_told(device):
         assert_equal(*(seen[ours] for seen, _ in outcomes))
 
 
-# One for each loop: on a device a controller is whoever gives openings, and has been hashed with the native environment.
-ROWS = reversed(fingerprints.rows().items())
-LOOPS = {(scenario, sensors, who == "residual"): row for row, (scenario, sensors, who) in ROWS}
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("row", LOOPS.values())
+@pytest.mark.usefixtures("in_one_code")
+@pytest.mark.parametrize("row", fingerprints.rows())
 def test_the_stored_fingerprints(row, device):
     stored = json.loads(fingerprints.FILE.read_text(encoding="utf-8"))
     assert fingerprints.fingerprint(*fingerprints.rows()[row], device=device) == stored[row]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 def test_tensors_are_taken_without_a_copy(device):
     torch = imported("torch")
     here, there = made("cpu"), made(device)
@@ -111,6 +111,7 @@ def test_tensors_are_taken_without_a_copy(device):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 @pytest.mark.parametrize("wrong", [np.zeros((7, 3)), np.full((7, 4), np.nan), np.full((7, 4), 1.1), "forward"])
 def test_wrong_actions_are_refused_in_the_same_words(wrong, device):
     envs = [made(place) for place in ("cpu", device)]
@@ -120,14 +121,14 @@ def test_wrong_actions_are_refused_in_the_same_words(wrong, device):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 def test_a_law_without_gains_is_explained_in_the_same_words(device):
-    soft = StiffnessSchedule(closed_loop=(10.0,))
-    envs = [made(place, RESIDUAL, stiffness=soft) for place in ("cpu", device)]
+    envs = [made(place, RESIDUAL, stiffness=SOFT) for place in ("cpu", device)]
     for env in envs:
         env.reset(seed=SEED)
     assert_same_refusal("10", *(partial(env.step, np.zeros(env.action_space.shape)) for env in envs))
     runs = evaluate, partial(evaluate_on, device)
-    assert_same_refusal("10", *(partial(run, CIRCLE, law("backstepping"), "law", 2, SEED, stiffness=soft) for run in runs))
+    assert_same_refusal("10", *(partial(run, CIRCLE, law("backstepping"), "law", 2, SEED, stiffness=SOFT) for run in runs))
 
 
 class Blow(ForceProfile):
@@ -142,6 +143,7 @@ def law(name="admittance-backstepping"):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_code")
 @pytest.mark.parametrize(("lanes", "world"), [(33, {}), (300, {"user_force": Blow()})])
 def test_an_evaluation_measures_the_same(lanes, world, device):
     shared = {"sensors": "lab", "randomize": True, "duration": 0.6, **world}

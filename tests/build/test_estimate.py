@@ -8,7 +8,6 @@ import pytest
 
 from birthsim_build.code.counting import COUNTS, OPERATIONS, counted
 from birthsim_build.code.stack import stack_bytes
-from tests.build.targets import build, need_linker
 
 ASSEMBLY = """
 	.type	first,%function
@@ -75,10 +74,8 @@ def test_operations_are_counted_as_they_are_executed():
 
 
 @pytest.mark.slow
-def test_the_object_needs_no_more_than_arm_s_conversions(tmp_path):
-    need_linker()
-    build("cortex-m7", tmp_path, "--controller", "admittance-backstepping", "--sensors", "ideal", "lab")
-    report = json.loads((tmp_path / "build.json").read_text())
+def test_the_object_needs_no_more_than_arm_s_conversions(cortex):
+    report = json.loads((cortex / "build.json").read_text())
     assert {"__aeabi_d2lz", "__aeabi_l2d", "__aeabi_ldivmod", "__aeabi_ul2d"} >= set(report["needs"])
     assert report["bss"] == report["data"] == 0
     assert 0 < report["stack"] < 2048

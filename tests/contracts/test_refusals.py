@@ -115,7 +115,7 @@ TABLE = [
     (partial(rig, **{"friction.law": "elasto_plastic"}), "mechanics.mass", (0.01,), "at least 0.0264 kg"),
     (partial(rig, **{"friction.law": "coulomb"}), "mechanics.mass", (1.0,), "or less friction"),
     (partial(rig, **{"mechanics.mode_frequency": 30.0}), "mechanics.mass", (0.03,), "or less friction"),
-    (rig, "friction.law", ("viscous",), "'lugre', 'coulomb', 'elasto_plastic'"),
+    (rig, "friction.law", ("viscous",), "'lugre', 'coulomb', 'elasto_plastic', 'gms'"),
     (rig, "cylinder2.rod_diameter", (0.025,), "less than piston_diameter"),
     (rig, "air.supply_pressure", (1e5,), "more than atmospheric_pressure"),
     (rig, "geometry.k2", (0.2,), "more than 0.22 m"),

@@ -15,6 +15,7 @@ from tests.registered import registered
 
 CIRCLE = "BirthSIM/Circle-v1"
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0})
+TUBED = Parameters().replace({"chambers.tube_length": 1.0, "chambers.pressure_cells": "valve"})
 
 
 def each(kind):
@@ -63,7 +64,11 @@ def assert_same(one, other):
 
 
 @each("sensors")
-@pytest.mark.parametrize("parameters", [Parameters(), FELT], ids=["without", "with an acceleration sensor"])
+@pytest.mark.parametrize(
+    "parameters",
+    [Parameters(), FELT, TUBED],
+    ids=["plain", "with an acceleration sensor", "with tubes and cells at the valves"],
+)
 def test_a_sensor_model_measures_the_same_in_python_and_compiled(one, parameters, monkeypatch):
     board = ("put_out",) if one.made(parameters.electronics, 1).has_board else ()
     registered(monkeypatch, in_python(one.made, "measure", *board), sensors="own")

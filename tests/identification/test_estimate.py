@@ -9,13 +9,25 @@ import pytest
 from baselines.identification import estimate, starts
 from baselines.identification.certainty import certainty_of
 from baselines.identification.estimate import Problem, fit, refine, search
-from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY, FreeParameter, coordinates, limits, rig_at
+from baselines.identification.experiment import propose
+from baselines.identification.free_parameters import (
+    FREE_PARAMETERS,
+    INSIDE,
+    LATENCY,
+    FreeParameter,
+    coordinates,
+    limits,
+    rig_at,
+)
 from baselines.identification.identified import identify
+from baselines.identification.laboratory import run_plan
 from baselines.identification.noise import guessed_noise
 from baselines.identification.starts import Noise
 from baselines.identification.trial import Trial
 from baselines.identification.windows import cut
-from birthsim_env.physics.rig.parameters import Parameters, value_of
+from baselines.named import make_controller
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
+from birthsim_env.physics.rig.servovalves import MPYE_5_M5, Curve
 from tests.identification.trials import OWNER, TRUE, part, trial
 
 SOME = tuple(
@@ -52,7 +64,8 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
     """J'r against central differences of the cost, whose start states and offsets are sought anew at every place."""
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
     monkeypatch.setattr(estimate, "STILL", 1e-5)
-    asked, theta = problem(), coordinates(TRUE, FREE_PARAMETERS)
+    # Not where an overlap is none: there are no differences to both sides.
+    asked, theta = problem(), coordinates(TRUE.replace(Curve(5e-4, 0.0).changes()), FREE_PARAMETERS)
     asked.jacobian(theta)  # whose slopes are those of where the start states end
     asked.residuals(theta + 1e-9)
     gradient = asked.jacobian(theta).T @ asked.residuals(theta)
@@ -72,7 +85,9 @@ def test_coordinates_go_there_and_back(one: FreeParameter) -> None:
     low, high = limits(OWNER, (one,))
     for edge in (low, high):
         rig_at(OWNER, (one,), edge)
-    assert low[0] < one.prior.coordinate(value_of(OWNER, one.name)) < high[0]
+    known = value_of(OWNER, one.name)
+    at_least = INSIDE if known == DECLARED[one.name].least else 0.0
+    assert low[0] <= one.prior.coordinate(known) + at_least < high[0]
 
 
 def test_the_noise_is_found_from_the_log_alone() -> None:
@@ -163,3 +178,26 @@ def test_fewer_parameters_are_fitted_anew_from_a_fit() -> None:
     deviation = certainty_of(first).deviation
     assert (np.abs(first.theta - again.theta) < 0.1 * deviation).all()
     assert (np.abs(first.theta - coordinates(TRUE, mass)) < 4 * deviation).all()
+
+
+def log_of(**more: float) -> Trial:
+    """5 s of the proposed experiment on a rig with the catalogue's valves, under a law that believes in linear ones."""
+    rig = TRUE.replace({**MPYE_5_M5.changes(), **{name.replace("__", "."): value for name, value in more.items()}})
+    return run_plan(propose(OWNER, 5.0, 0), [rig], make_controller("backstepping", OWNER), "lab", 5)[0]
+
+
+@pytest.mark.slow
+def test_the_curve_of_the_valves_is_found_from_five_seconds() -> None:
+    found = identify(log_of(), OWNER, 0)
+    rows = {row.name: row for row in found.rows}
+    for name, true in MPYE_5_M5.changes().items():
+        assert rows[name].determined
+        assert rows[name].value == pytest.approx(true, rel=0.01 if name.endswith("overlap") else 0.03)
+    assert rows["mechanics.mass"].value == pytest.approx(TRUE.mechanics.mass, rel=0.01)
+    assert not [line for line in found.words() if "fit worse" in line or "more than noise" in line]
+
+
+@pytest.mark.slow
+def test_a_valve_unlike_the_others_is_named() -> None:
+    (line,) = [line for line in identify(log_of(valve_n2__supply_overlap=0.03), OWNER, 0).words() if "fit worse" in line]
+    assert line.startswith("pressures_N2")

@@ -14,10 +14,10 @@ NOISE = Noise(500.0, 1e-4)
 NO_FORCE = ForceOffset(np.array([0.2, 0.9]), np.array([0.01, 0.3]))
 
 
-def made(rows=(), noise=NOISE, pull=NO_FORCE, biases=(0.0, 900.0, -4000.0, 5000.0), ended=True):
+def made(rows=(), noise=NOISE, pull=NO_FORCE, biases=(0.0, 900.0, -4000.0, 5000.0), ended=True, left=(1.0, 0.9, 1.1, 1.0)):
     fit = SimpleNamespace(problem=SimpleNamespace(offsets=SimpleNamespace(biases=biases)), ended=ended)
     certainty = SimpleNamespace(weakest=())
-    return Identified(rows, Parameters(), fit, certainty, noise, NOISE, ("left out: a row",), pull)  # type: ignore[arg-type]
+    return Identified(rows, Parameters(), fit, certainty, noise, NOISE, ("left out: a row",), pull, np.array(left))  # type: ignore[arg-type]
 
 
 def said(name, value, determined=True):
@@ -43,6 +43,9 @@ def test_causes_of_a_bad_fit_are_named():
     assert "a constant force of (-3, 0.5) N acts on the rig" in line
     (line,) = warned(biases=(0.0, -95e3, 0.0, 0.0))
     assert line.startswith("pressures_N1 seems to be 9.5e+04 Pa too low")
+    (line,) = warned(left=(1.05, 1.0, 1.1, 1.6))
+    assert line.startswith("pressures_N2 fit worse")
+    assert "[valve_n2]" in line
     (line,) = warned(ended=False)
     assert "evaluations" in line
 

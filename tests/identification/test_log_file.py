@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from baselines.identification.log_columns import PISTONS, LogOptions
 from baselines.identification.log_file import COLUMNS, FORCES, read_trial, write_trial
 from baselines.logs.log import Column, Log, Series
 from baselines.logs.table import read_table
 from baselines.logs.writing import write_log
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.tables.table import Reading
 from tests.identification.trials import OWNER, part, trial
 
@@ -45,6 +47,31 @@ def rows() -> Rows:
 def write(content: Rows, path: Path) -> None:
     lines = [",".join(content), *(",".join(f"{value:.10g}" for value in row) for row in zip(*content.values(), strict=True))]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def counted(content: Rows) -> Rows:
+    """The log of a rig with encoders."""
+    place = np.array([content.pop("position_x"), content.pop("position_y")])
+    return content | dict(zip(PISTONS, inverse_geometry(place, OWNER), strict=True))
+
+
+@pytest.mark.parametrize("names", [PISTONS, ("Encoder 1 [mm]", "Encoder 2 [mm]")], ids=["by name", "mapped"])
+def test_encoders_tell_where_the_head_is(names: tuple[str, str], tmp_path: Path) -> None:
+    content = counted(rows())
+    for name, other in zip(PISTONS, names, strict=True):
+        content[other] = content.pop(name) * (1e3 if "mm" in other else 1.0)
+    write(content, tmp_path / "log.csv")
+    mapping = ",".join(f"{name}={other.split(' [')[0]}" for name, other in zip(PISTONS, names, strict=True))
+    trial = read_trial(tmp_path / "log.csv", OWNER, LogOptions(columns=mapping if names != PISTONS else ""))
+    np.testing.assert_allclose(trial.positions, SHORT.positions, atol=1e-9)
+
+
+def test_counts_that_no_linkage_reaches_are_refused(tmp_path: Path) -> None:
+    content = counted(rows())
+    content["piston_y1"] += 1.0
+    write(content, tmp_path / "log.csv")
+    with pytest.raises(ValueError, match=r"piston_y1, piston_y2 of encoders: .*; allowed: "):
+        read_trial(tmp_path / "log.csv", OWNER)
 
 
 def test_without_forces_there_is_no_hand_and_a_recording_has_two(tmp_path: Path) -> None:

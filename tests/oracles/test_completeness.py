@@ -24,6 +24,7 @@ ELSEWHERE = {
     "mechanics.impact_speed": "an episode reports impacts, which the plant only measures",
     "valves.crossing": "whoever inverts the characteristic crosses the overlap over it",
     "air.polytropic_index": "the control model's, with which controllers and starts compute",
+    "chambers.pressure_cells": "sensors measure there",
 }
 """Parameters of the plant's sections that move nothing, and who uses them."""
 

@@ -132,14 +132,14 @@ def test_options_of_a_rig_have_their_states() -> None:
     assert len(model.states) == 31
     # The handle, the piston's end and its bristle carry the hand.
     np.testing.assert_allclose(model.at.rates[[at.V1, at.V2, 21, 22]], 0.0, atol=1e-9)
-    sizes = np.concatenate([SCALES[:18], [1e5, 0.1, 0.1, 0.1, 0.1], np.full(8, 1e-3), SCALES[18:]])
+    sizes = np.concatenate([SCALES[:18], [1e5, 0.1, 0.1, 0.1, 0.1], np.full(4, 1e5), np.full(4, 1e-4), SCALES[18:]])
     step, duration = 1e-5 * sizes, 1e-5
     ways = np.concatenate([np.diag(step), -np.diag(step)], axis=1)
     plant = Plant(rig, ways.shape[1])
     plant.state = model.at.state[:18, None] + ways[:18]
-    plant.memory[4:] = model.at.state[18:, None] + ways[18:31]
+    plant.memory[4:17] = model.at.state[18:31, None] + ways[18:31]
     plant.advance(ways[31:35], hand[:, None] + ways[35:], duration)
-    reached = np.concatenate([plant.state, plant.memory[4:]])
+    reached = np.concatenate([plant.state, plant.memory[4:17]])
     found = (reached[:, :37] - reached[:, 37:]) / (2 * step)
     whole = np.zeros((37, 37))
     whole[:31] = np.hstack([model.A, model.B])

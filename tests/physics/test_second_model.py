@@ -63,6 +63,16 @@ CASES = {
     "Coulomb, stick-slip": ({"friction.law": "coulomb"}, stick_slip, 1, (1e-7, 1e-6)),
     "pressed seals, stick-slip": (PRESSED, stick_slip, 1, (2e-8, 1e-7)),
     "pressed seals, elasto-plastic, strong": ({**PRESSED, **ELASTO_PLASTIC}, strong, 1, (2e-7, 1e-6)),
+    # Bristles over the two decades that may be drawn; the relaxation limit holds stiff ones from 0.2 m/s on.
+    "soft bristles, strong": ({"friction.bristle_stiffness": 5e3}, strong, 1, (2e-7, 1.2e-6)),
+    "stiff bristles, stick-slip": ({"friction.bristle_stiffness": 5e5}, stick_slip, 1, (1.5e-7, 9e-7)),
+    "stiff bristles, strong": ({"friction.bristle_stiffness": 5e5}, strong, 1, (1.3e-6, 7e-6)),
+    "stiff bristles, elasto-plastic, strong": (
+        {**ELASTO_PLASTIC, "friction.bristle_stiffness": 5e5},
+        strong,
+        1,
+        (1e-5, 6e-5),
+    ),
     # The corners of sign(v) in (4) cost the default step more; smaller steps show that nothing else differs.
     "Coulomb, strong": ({"friction.law": "coulomb"}, strong, 1, (1.5e-5, 1e-4)),
     "Coulomb, strong, fine steps": ({"friction.law": "coulomb"}, strong, 16, (1e-7, 1e-6)),

@@ -42,7 +42,7 @@ ADDED = {
     ),
     "sensor": Recipe("camera", CONTRACTS[:1], 12, (("-m", "birthsim", "run", "--sensors", "no", "--out", "x"),)),
     "scenario": Recipe("crowning", ("tests/contracts/test_environments.py",), 2),
-    "parameter": Recipe("seal_friction", ("tests/oracles/test_completeness.py",), 1),
+    "parameter": Recipe("quadratic_friction", ("tests/oracles/test_completeness.py",), 1),
     "study": Recipe("lab-sensors", said=(("-m", "birthsim", "study", "--help"),)),
 }
 PAGES = {"controller": "controllers.md", "sensor": "environments.md", "scenario": "environments.md", "parameter": "rig.md"}
@@ -158,5 +158,5 @@ def test_a_parameter_that_an_oracle_does_not_know_fails_a_test_that_names_both(t
     os.replace(place / "second_model.py", place / "lab" / "studies" / "accuracy" / "second_model.py")
     status, said = run_in(place, "-m", "pytest", "-p", "no:cacheprovider", "tests/oracles/test_completeness.py")
     assert status == 1
-    assert "friction.seal_friction" in said
+    assert "friction.quadratic_friction" in said
     assert "second_model" in said

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from baselines.identification.valve_table import parts_of
 from lab.engine import shelf
 from lab.studies.validation import seals, study, tables, valve
 
@@ -29,7 +30,7 @@ def write_seals(data, seal="PK", seconds=8.0):
 
 def write_valve(data, overlap=0.08, curvature=0.3):
     volts = np.linspace(5, 10, 41)
-    flow = 80.0 * valve.characteristic((volts - 5) / 5, overlap, curvature)
+    flow = 80.0 * parts_of((volts - 5) / 5, overlap, curvature)
     (data / valve.FILE).parent.mkdir()
     head = "Voltage (volt),Exp. Vol. flow rate (l/min)"
     np.savetxt(data / valve.FILE, np.column_stack([volts, flow]), "%.6f", ",", header=head, comments="")

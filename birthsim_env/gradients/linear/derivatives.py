@@ -15,13 +15,16 @@ from birthsim_env.gradients.evaluated import evaluated
 from birthsim_env.gradients.graph import Graph, Scalar
 from birthsim_env.gradients.symbols import empty, inputs
 from birthsim_env.gradients.tracing import call
-from birthsim_env.physics import control_model, dynamics, mechanics, options
+from birthsim_env.physics import control_model, dynamics, mechanics, options, tubes
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector_motion
 
 KINKED = (at.V1, at.V2, *at.SPOOLS)
 """States that may stand on a kink: dry friction and orifices."""
+
+STILL = range(at.STATES + options.FLOWS, at.STATES + options.BRISTLES)
+"""The same of ``physics.options``: air in tubes, which carries the heat of where it comes from."""
 
 BESIDE = 1e-300
 """Of such a state: on one side of zero, and nothing beside any other value."""
@@ -34,9 +37,10 @@ def _traced(has_options: bool) -> tuple[Graph, list[Scalar]]:
     x, u, f, p = (inputs(graph, name, rows) for name, rows in (("x", size), ("u", 4), ("f", 2), ("p", at.PARAMETERS)))
     rates, motion = empty(size), empty(4)
     if has_options:
-        own = empty(at.PARAMETERS)
-        call(options.alter, p, own, 1)
-        call(options.right_hand_side, x, u, f, own, empty(4), empty(2), rates, 1)
+        own, tube = empty(at.PARAMETERS), empty(tubes.CONSTANTS)
+        call(options.alter, p, own, tube, 1)
+        rates[at.STATES + options.BRISTLES :] = 0.0
+        call(options.right_hand_side, x, u, f, own, tube, empty(4), empty(2), empty(2), rates, 1)
         call(options.port_motion, x[: at.STATES], x[at.STATES :], p, motion)
     else:
         call(dynamics.right_hand_side, x, u, f, p, rates, 1)
@@ -67,7 +71,7 @@ def derivatives_of(x: Array, u: Array, f: Array, p: Array) -> tuple[Array, Array
     size, lanes = x.shape
     graph, wanted = _traced(size > at.STATES)
     both = np.concatenate([x, x], axis=1)
-    both[list(KINKED)] += np.repeat([BESIDE, -BESIDE], lanes)
+    both[[*KINKED, *(STILL if size > at.STATES else ())]] += np.repeat([BESIDE, -BESIDE], lanes)
     twice = {name: np.concatenate([block, block], axis=1) for name, block in (("u", u), ("f", f), ("p", p))}
     found = evaluated(graph, {"x": both, **twice}, wanted).reshape(len(wanted), 2, lanes).mean(axis=1)
     count = size + 12

@@ -10,7 +10,8 @@ leave over, so that the point is a balance of forces.
   states. The falling part of Stribeck's curve, below about ``stribeck_speed``, is left out.
 
 Shut spools lie on a kink: opening fills a chamber from the supply, closing empties it to the atmosphere. The gain there is the
-mean of both (``derivatives``). An opening on one side of zero, however small, gives the gain of that side.
+mean of both (``derivatives``). An opening on one side of zero, however small, gives the gain of that side. Within an overlap
+there is none.
 """
 
 from pathlib import Path
@@ -26,6 +27,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
 from birthsim_env.physics.dynamics import coulomb_level
 from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.maxwell_slip import ELEMENTS
 from birthsim_env.physics.mechanics import piston_force
 from birthsim_env.physics.plant import Plant, checked
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
@@ -35,9 +37,11 @@ _UNITS = {"y": "m", "v": "m/s", "z": "m", "P": "Pa", "T": "K", "s": "1"}
 STATES = tuple(Signal(name, _UNITS[name[0]]) for name in at.STATE_NAMES)
 FURTHER = (
     Signal("Ps", "Pa"), Signal("xh", "m"), Signal("yh", "m"), Signal("vxh", "m/s"), Signal("vyh", "m/s"),
-    *(Signal(f"q{chamber}_{way}", "kg/s") for way in ("in", "out") for chamber in ("1P", "1N", "2P", "2N")),
+    *(Signal(f"{name}{chamber}", unit) for name, unit in (("Pv", "Pa"), ("q", "kg/s")) for chamber in ("1P", "1N", "2P", "2N")),
+    *(Signal(f"z{cylinder}_{element}", "m") for cylinder in (1, 2) for element in range(1, ELEMENTS + 1)),
+    *(Signal(f"slips{cylinder}_{element}", "1") for cylinder in (1, 2) for element in range(1, ELEMENTS + 1)),
 )  # fmt: skip
-"""States of rigs with ``physics.options``: pressure at the valves, handle, flows at the chambers."""
+"""States of rigs with ``physics.options``: supply at the valves, handle, ends of tubes, flows in them, elements of bristles."""
 INPUTS = (*(Signal(name, "1") for name in ("u1P", "u1N", "u2P", "u2N")), Signal("Fx", "N"), Signal("Fy", "N"))
 """Opening that each spool goes to, and the hand's force."""
 OUTPUTS = (
@@ -162,18 +166,19 @@ def linearize(
     x[list(at.PRESSURES)] = np.clip(pressure, low * (1 + EDGE), high * (1 - EDGE))
     x[list(at.TEMPERATURES)] = p[at.TEMPERATURE, 0]
     x[list(at.SPOOLS)] = u
-    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_RATE], 0] > 0.0)], [at.STATES, 1, 4, 8])
-    has_bristle = p[at.LUGRE, 0] + p[at.ELASTO_PLASTIC, 0] > 0.5
+    # The mean bristle of a stuck piston is that of its elements.
+    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_LENGTH], 0] > 0.0), False], [at.STATES, 1, 4, 8, 4 * ELEMENTS])
+    has_bristle = p[at.BRISTLED, 0] > 0.5
     ratio = p[at.STATIC_RATIO, 0] if has_bristle else 1.0
     if friction == "sliding":
         # A bristle that neither moves nor damps holds dry friction where it is.
-        p[at.LUGRE], p[at.ELASTO_PLASTIC], p[at.S1] = 1.0, 0.0, 0.0
+        p[at.LUGRE], p[at.BRISTLED], p[at.GMS], p[at.S1] = 1.0, 1.0, 0.0, 0.0
     kept[[at.Z1, at.Z2]] = friction == "stuck" and has_bristle
     load = geometry.joint_force([f[0], f[1] - p[at.MASS, 0] * p[at.GRAVITY, 0]], piston, rig)
     leans = friction == "sliding" or has_bristle
     x[[at.Z1, at.Z2]] = _left_over(x, load, p, ratio) / p[at.S0, 0] if leans else 0.0
     names = STATES
-    if kept[at.STATES :].any():
+    if not options.are_off(p):
         x, names = np.concatenate([x, _further(x, f, p)]), STATES + FURTHER
     kept = kept[: len(x)]
     found, slopes = derivatives_of(x[:, None], u[:, None], f[:, None], p)

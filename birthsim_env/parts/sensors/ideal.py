@@ -2,9 +2,9 @@
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.sensors.cells import pressure_at_cell
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PRESSURES
 from birthsim_env.registry import register
 
 
@@ -18,7 +18,7 @@ def ideal_stage(world: World, seen: Seen, memory: int, constants: int, tables: i
             seen.position[axis, i], seen.velocity[axis, i] = place[axis, i], speed[axis, i]
             seen.user_force[axis, i] = world.force[axis, i]
         for chamber in range(4):
-            seen.pressure[chamber, i] = world.state[PRESSURES[chamber], i]
+            seen.pressure[chamber, i] = pressure_at_cell(world, chamber, i)
     return 0
 
 

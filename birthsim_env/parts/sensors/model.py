@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import FORCE, MOTION, STATE, TICK, Signals, measurement_of
+from birthsim_env.loop.rows import AT_VALVE, FORCE, MOTION, STATE, TICK, Signals, measurement_of
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, Staged
 from birthsim_env.parts.drawn.seeding import vectorised
@@ -72,7 +72,7 @@ class SensorModel(Staged):
         motion : array (4, N)
             x, y, vx, vy of the end effector, m and m/s.
         pressures : array (4, N)
-            Of the chambers P1, N1, P2, N2, Pa.
+            At the cells of the chambers P1, N1, P2, N2, Pa.
         force : array (2, N)
             Of the hand on the end effector, N.
         pistons : array (4, N), optional
@@ -87,7 +87,7 @@ class SensorModel(Staged):
             )
         seen = np.zeros((Signals.size, len(time)))
         Signals(seen).time[:] = time
-        cells = [(pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES)]
+        cells = [(pressures, AT_VALVE), *((pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES))]
         world = [(ticks[None], TICK), (motion, MOTION), (force, FORCE), *cells]
         world += [(one, row) for one, row in ((pistons, STATE + Y1), (rig, 0)) if one is not None]
         placed = [(np.ascontiguousarray(array, dtype=np.float64), row) for array, row in world]

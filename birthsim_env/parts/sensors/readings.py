@@ -6,11 +6,12 @@ import numpy as np
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.parts.sensors import acceleration
+from birthsim_env.parts.sensors.cells import pressure_at_cell
 from birthsim_env.parts.sensors.noise import happens, noise_of
 from birthsim_env.parts.sensors.sensor_errors import Errors, Shared
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import PRESSURES, Array
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 
 NOISE_OF_FORCE, MISSED = 6, 9
@@ -128,7 +129,7 @@ def sense_pressures(world: World, readings: Readings, e: Errors, shared: Shared,
     tick = int(world.tick[i])
     for chamber in range(4):
         noise = noise_of(key, tick, chamber, e.parameters.pressure_noise[i])
-        value = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
+        value = pressure_at_cell(world, chamber, i) + e.cells[chamber, i] + noise
         readings.pressure[chamber, i] = converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
 
 

@@ -207,8 +207,9 @@ class Friction(Section):
         "-",
         "friction law",
         default="lugre",
-        source="LuGre (Canudas de Wit 1995), the paper's (4), or elasto-plastic without presliding drift (Dupont 2002)",
-        choices=("lugre", "coulomb", "elasto_plastic"),
+        source="LuGre (Canudas de Wit 1995), the paper's (4), elasto-plastic without presliding drift (Dupont 2002), or "
+        "generalised Maxwell slip with memory of reversals (Al-Bender 2005)",
+        choices=("lugre", "coulomb", "elasto_plastic", "gms"),
     )
     static_ratio: float = parameter(
         "-",
@@ -254,6 +255,18 @@ class Friction(Section):
         most=0.9,
         row="breakaway",
     )
+    attraction: float = parameter(
+        "N/s",
+        "attraction C of gms: how fast friction follows its level while a piston slides",
+        default=1000.0,
+        source="assumed",
+        above=0,
+        most=1e6,
+        option=True,
+        range=(200, 5000),
+        on_request=True,
+        logarithmic=True,
+    )
     sign_speed: float = parameter(
         "m/s",
         "speed below which (4)'s sign(v) is v/sign_speed",
@@ -265,8 +278,7 @@ class Friction(Section):
     )
 
     lugre = derived("1", "1 with the friction law of that name, else 0", lambda own: float(own.law == "lugre"))
-    elasto_plastic = derived(
-        "1", "1 with the friction law of that name, else 0", lambda own: float(own.law == "elasto_plastic")
-    )
+    gms = derived("1", "1 with the friction law of that name, else 0", lambda own: float(own.law == "gms"))
+    bristled = derived("1", "1 with a friction law that has bristles, else 0", lambda own: float(own.law != "coulomb"))
     steepness = derived("1", "1/(1 - breakaway)", lambda own: 1 / (1 - own.breakaway_ratio))
     sign_slope = derived("s/m", "1/sign_speed", lambda own: 1 / own.sign_speed)

@@ -7,30 +7,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 import tomli_w
 
 from birthsim_env.files import write_text
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.rig.consistency import check_together, follow
-from birthsim_env.physics.rig.declaration import Parameter, Section, derived
+from birthsim_env.physics.rig.declaration import Parameter, Section
 from birthsim_env.physics.rig.mechanical import Cylinder, Friction, Geometry, Mechanics
 from birthsim_env.physics.rig.pneumatic import Air, Chambers
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.servovalves import Valve, Valves, edge_rows
 from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
-from birthsim_env.physics.step import STEP
 
 __all__ = [
     "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters",
     "Valve", "Valves", "load_parameters", "parameter_of", "value_of",
 ]  # fmt: skip
-
-
-def _tube_rate(rig: Any) -> Any:
-    air, length = rig.air, rig.chambers.tube_length
-    sound = np.sqrt(air.heat_capacity_ratio * air.gas_constant * air.temperature)
-    return np.where(np.greater(length, 0.0), sound / np.maximum(length, STEP.shortest_tube), 0.0)
 
 
 @dataclass(frozen=True)
@@ -96,7 +88,6 @@ class Parameters:
     electronics: Electronics = Electronics()
     ranges: tuple[tuple[str, float, float], ...] = ()
 
-    tube_rate = derived("1/s", "c/L of the tubes", _tube_rate)
     vars().update(edge_rows())
 
     def __post_init__(self) -> None:

@@ -7,6 +7,9 @@ import numpy as np
 
 from birthsim_env.physics.rig.declaration import Prior, Section, derived, parameter
 
+IN_CHAMBER = 0.75
+"""Part of a tube's air that counts to the chamber's; the rest is at the valve's end (``physics.tubes``)."""
+
 
 def _tube_volume(own: Any) -> Any:
     return np.pi / 4 * own.tube_diameter * own.tube_diameter * own.tube_length
@@ -58,7 +61,6 @@ class Chambers(Section):
         option=True,
         range=(0.5, 3),
         on_request=True,
-        row=None,
     )
     tube_diameter: float = parameter(
         "m",
@@ -70,11 +72,26 @@ class Chambers(Section):
         option=True,
         range=(0.0025, 0.006),
         on_request=True,
-        row=None,
+    )
+    pressure_cells: str = parameter(
+        "-",
+        "where the pressure cells sit: in the chambers, or at the valves' ends of the tubes",
+        default="chamber",
+        source="assumed",
+        choices=("chamber", "valve"),
+        option=True,
     )
 
     whole_dead_volume = derived(
-        "m3", "dead volume of a chamber, with its tube", lambda own: own.dead_volume + _tube_volume(own), row="dead_volume"
+        "m3",
+        "dead volume of a chamber, with its part of the tube",
+        lambda own: own.dead_volume + IN_CHAMBER * _tube_volume(own),
+        row="dead_volume",
+    )
+    cell_at_valve = derived(
+        "1",
+        "1 where pressure cells sit at the valves' ends of tubes, else 0",
+        lambda own: np.where(np.greater(own.tube_length, 0.0), float(own.pressure_cells == "valve"), 0.0),
     )
 
 

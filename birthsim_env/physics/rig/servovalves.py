@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from birthsim_env.physics import valves
+from birthsim_env.physics.characteristic import edge_of
 from birthsim_env.physics.rig.declaration import Derived, Prior, Section, derived, parameter
 
 
@@ -78,7 +79,7 @@ class Valves(Section):
         "s",
         "time constant of a spool",
         default=0.004,
-        source="assumed; -3 dB at 40 Hz",
+        source="assumed, -3 dB at 40 Hz; the data sheet has 125 Hz for the spool of an MPYE-5-M5, 1.3 ms (docs/valves.md)",
         least=2e-4,
         most=10,
         range=(0.0015, 0.008),
@@ -95,6 +96,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.overlap,
         on_request=True,
+        identified=Prior(5.0, scale=0.01),
         row=None,
     )
     supply_curvature: float = parameter(
@@ -107,6 +109,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.curvature,
         on_request=True,
+        identified=Prior(2.5, scale=0.1),
         row=None,
     )
     exhaust_overlap: float = parameter(
@@ -119,6 +122,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.overlap,
         on_request=True,
+        identified=Prior(5.0, scale=0.01),
         row=None,
     )
     exhaust_curvature: float = parameter(
@@ -131,6 +135,7 @@ class Valves(Section):
         option=True,
         range=TOLERATED.curvature,
         on_request=True,
+        identified=Prior(2.5, scale=0.1),
         row=None,
     )
     exhaust_ratio: float = parameter(
@@ -193,8 +198,8 @@ class Valve(Section):
         "more overlap of the edge to the supply; one that comes below 0 is 0",
         default=0.0,
         source="assumed",
-        least=-0.2,
-        most=0.2,
+        least=-0.3,
+        most=0.3,
         option=True,
         range=(-0.02, 0.02),
         on_request=True,
@@ -202,11 +207,11 @@ class Valve(Section):
     )
     supply_curvature: float = parameter(
         "-",
-        "more curvature of the edge to the supply",
+        "more curvature of the edge to the supply; one that comes beyond 0.95 is 0.95",
         default=0.0,
         source="assumed",
-        least=-0.15,
-        most=0.15,
+        least=-0.8,
+        most=0.8,
         option=True,
         range=(-0.04, 0.04),
         on_request=True,
@@ -229,8 +234,8 @@ class Valve(Section):
         "more overlap of the edge to the exhaust; one that comes below 0 is 0",
         default=0.0,
         source="assumed",
-        least=-0.2,
-        most=0.2,
+        least=-0.3,
+        most=0.3,
         option=True,
         range=(-0.02, 0.02),
         on_request=True,
@@ -238,11 +243,11 @@ class Valve(Section):
     )
     exhaust_curvature: float = parameter(
         "-",
-        "more curvature of the edge to the exhaust",
+        "more curvature of the edge to the exhaust; one that comes beyond 0.95 is 0.95",
         default=0.0,
         source="assumed",
-        least=-0.15,
-        most=0.15,
+        least=-0.8,
+        most=0.8,
         option=True,
         range=(-0.04, 0.04),
         on_request=True,
@@ -262,6 +267,9 @@ class Valve(Section):
     )
 
 
+MOST_CURVED = 0.95
+"""Beyond a curvature of 1 an edge would let less through again before it is fully open."""
+
 VALVES = ("p1", "n1", "p2", "n2")
 """Chambers in the order of the state, whose valves have the sections ``valve_p1`` to ``valve_n2``."""
 
@@ -271,11 +279,11 @@ def _edge_number(side: str, valve: str, number: int, rig: Any) -> Any:
     shared, own = rig.valves, getattr(rig, f"valve_{valve}")
     overlap = np.maximum(getattr(shared, f"{side}_overlap") + getattr(own, f"{side}_overlap"), 0.0)
     curvature = getattr(shared, f"{side}_curvature") + getattr(own, f"{side}_curvature")
+    curvature = np.minimum(np.maximum(curvature, -MOST_CURVED), MOST_CURVED)
     share = 1.0 + getattr(own, f"{side}_conductance")
     if side == "exhaust":
         share = share * shared.exhaust_ratio
-    reach = 1.0 - overlap
-    return (overlap, share * (1.0 + curvature) / reach, share * curvature / (reach * reach))[number]
+    return edge_of(overlap, curvature, share)[number]
 
 
 def edge_rows() -> Iterator[tuple[str, Derived]]:

@@ -4,6 +4,9 @@ It is the oracle of the plant: tests compare both, and ``accuracy`` measures the
 effector x, y, vx, vy; air masses (4) and internal energies (4) of chambers P1, N1, P2, N2; bristles z1, z2; spools (4). Rod
 forces act between points, chambers obey conservation of mass and energy, and nothing of the package is imported but the data of
 a rig.
+
+With generalised Maxwell slip the forces of the elements follow, four of piston 1 and four of piston 2. Each sticks or slips
+until an event, whose instant is found: it reaches its share of the level, or its piston turns.
 """
 
 from collections.abc import Callable
@@ -14,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from birthsim_env.physics.maxwell_slip import ELEMENTS, REACH, STIFFNESS
 from birthsim_env.physics.rig.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -28,11 +32,15 @@ LEFT_OUT = {
 """Parameters that ``dynamics`` computes with and this model does not, and why not."""
 
 SCALES = np.array([0.1, 0.1, 0.1, 0.1, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1.0] * 4])
+ELEMENT_SCALES = np.ones(2 * ELEMENTS)
 """Size of each state: the solver sees multiples of it, so that one absolute tolerance serves all."""
 
 
 def constants(rig: Parameters) -> tuple[Array, ...]:
-    """Numbers of a rig: linkage, mass, friction per cylinder, chambers, valves, their edges, air."""
+    """Numbers of a rig: linkage, mass, friction per cylinder, its law, chambers, valves, their edges, air.
+
+    The last numbers of the law are the way in which each element slips, 1 or -1, and 0 of those that stick.
+    """
     g, m, f, v, air = rig.geometry, rig.mechanics, rig.friction, rig.valves, rig.air
     cylinders = (rig.cylinder1, rig.cylinder2)
     pivot = g.d3 * np.exp(1j * g.gamma3)
@@ -41,8 +49,9 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     rubbing = [(c.coulomb_friction, c.pressure_friction, c.direction_asymmetry, c.viscous_friction) for c in cylinders]
     pistons = np.array([(*size, *level) for size, level in zip(sizes, rubbing, strict=True)])
     bristle = f.bristle_stiffness, f.bristle_damping
-    number = ("coulomb", "lugre", "elasto_plastic").index(f.law)
-    law = np.array([number, f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio], dtype=float)
+    number = ("coulomb", "lugre", "elasto_plastic", "gms").index(f.law)
+    numbers = f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio, f.attraction
+    law = np.array([number, *numbers, *np.zeros(2 * ELEMENTS)], dtype=float)
     heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
     valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
     edges = np.empty((4, 2, 3))  # overlap, curvature and share of the edges to supply and exhaust
@@ -51,7 +60,7 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
         to_exhaust = v.exhaust_overlap + own.exhaust_overlap, v.exhaust_curvature + own.exhaust_curvature
         edges[k, 0] = *to_supply, 1 + own.supply_conductance
         edges[k, 1] = *to_exhaust, v.exhaust_ratio * (1 + own.exhaust_conductance)
-    edges[:, :, 0] = edges[:, :, 0].clip(0)
+    edges[:, :, 0], edges[:, :, 1] = edges[:, :, 0].clip(0), edges[:, :, 1].clip(-0.95, 0.95)
     around = air.supply_pressure, air.atmospheric_pressure, air.temperature
     reference = air.reference_density, air.reference_temperature
     gas = np.array([*around, air.gas_constant, air.heat_capacity_ratio, *reference])
@@ -101,6 +110,16 @@ def plastic_fraction(z: float, v: float, steady: float, breakaway: float) -> flo
 
 
 @compiled
+def element_rate(
+    force: float, way: float, v: float, strength: float, stiffness: float, level: float, attraction: float
+) -> float:
+    """Rate of the force of an element, N/s, that sticks, or slips along ``way``, no faster than its piston bends it."""
+    if way == 0:
+        return stiffness * v
+    return way * min(attraction * (strength - way * force / level), way * stiffness * v)
+
+
+@compiled
 def rates(
     s: Array,
     command: Array,
@@ -114,9 +133,27 @@ def rates(
     gas: Array,
 ) -> Array:
     """d(state)/dt."""
+    return rates_and_levels(np.zeros(4), s, command, push, linkage, pistons, law, heat, valve, edges, gas)
+
+
+@compiled
+def rates_and_levels(
+    found: Array,
+    s: Array,
+    command: Array,
+    push: Array,
+    linkage: Array,
+    pistons: Array,
+    law: Array,
+    heat: Array,
+    valve: Array,
+    edges: Array,
+    gas: Array,
+) -> Array:
+    """d(state)/dt, with the speeds of both pistons and their levels G(v) in ``found`` (4,)."""
     ox, oy, d6, k1, k2, mass, gravity = linkage
     supply, atmosphere, ambient, r, gamma, rho, t_ref = gas
-    ds = np.zeros(18)
+    ds = np.zeros(len(s))
     x, y, vx, vy = s[0], s[1], s[2], s[3]
 
     # The linkage as points: beam direction e, its left normal n, attachment A, rod direction u.
@@ -163,8 +200,16 @@ def rates(
 
         fc = unpressed + growth * ((pressure[0] - atmosphere) + (pressure[1] - atmosphere))
         fc = max(fc, 0.0) * (1 + asymmetry * np.sign(v))
-        if law[0] > 0:
-            level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
+        level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
+        found[c], found[2 + c] = v, level
+        if law[0] == 3:
+            rubbing = fv * v
+            for e in range(ELEMENTS):
+                k, force, stiffness = 18 + ELEMENTS * c + e, s[18 + ELEMENTS * c + e], STIFFNESS[e] * law[3]
+                strength = STIFFNESS[e] * REACH[e]
+                ds[k] = element_rate(force, law[8 + ELEMENTS * c + e], v, strength, stiffness, level, law[7])
+                rubbing += force + law[4] * ds[k] / law[3]
+        elif law[0] > 0:
             alpha = 1.0 if law[0] == 1 else plastic_fraction(s[12 + c], v, level / law[3], law[6])
             sliding = v - alpha * law[3] * abs(v) / level * s[12 + c]
             ds[12 + c] = sliding
@@ -192,6 +237,8 @@ class SecondModel:
         mass = pressure * self._volumes(observed) / (rig.air.gas_constant * temperature)
         energy = mass * temperature * rig.air.gas_constant / (rig.air.heat_capacity_ratio - 1)
         self.state: Array = np.concatenate([observed, mass, energy, state[4:6], state[14:18]])
+        if rig.friction.law == "gms":
+            self.state = np.concatenate([self.state, np.zeros(2 * ELEMENTS)])
 
     def _volumes(self, s: Array) -> Array:
         g, half = self._rig.geometry, np.array([self._rig.cylinder1.stroke, self._rig.cylinder2.stroke]) / 2
@@ -214,16 +261,53 @@ class SecondModel:
         ``method`` is one of ``solve_ivp``. By default it has order 8 and chooses its own steps. Tolerances are those of the
         scaled state (``SCALES``).
         """
-        evaluations = 0
+        evaluations, scales = 0, np.concatenate([SCALES, ELEMENT_SCALES])[: len(self.state)]
 
         def scaled(_: float, s: Array) -> Array:
             nonlocal evaluations
             evaluations += 1
-            result: Array = rates(s * SCALES, command, push, *self.constants) / SCALES
+            result: Array = rates(s * scales, command, push, *self.constants) / scales
             return result
 
-        solution = solve_ivp(scaled, (0, seconds), self.state / SCALES, method=method, rtol=rtol, atol=atol)
-        if not solution.success:
-            raise RuntimeError(f"the second model could not be integrated: {solution.message}")
-        self.state = solution.y[:, -1] * SCALES
+        now = 0.0
+        while now < seconds:
+            events = self._events(command, push, scales)
+            solution = solve_ivp(
+                scaled, (now, seconds), self.state / scales, method=method, rtol=rtol, atol=atol, events=events
+            )
+            if not solution.success:
+                raise RuntimeError(f"the second model could not be integrated: {solution.message}")
+            self.state, now = solution.y[:, -1] * scales, solution.t[-1]
+            self._switch(command, push)
         return evaluations
+
+    def _margins(self, s: Array, command: Array, push: Array) -> tuple[Array, Array]:
+        """Speeds of the pistons, and what is left of the elements' shares of their levels, N, (8,)."""
+        found = np.zeros(4)
+        rates_and_levels(found, s, command, push, *self.constants)
+        shares = np.multiply(STIFFNESS, REACH)
+        return found[:2], np.concatenate([shares * found[2], shares * found[3]]) - np.abs(s[18:])
+
+    def _events(self, command: Array, push: Array, scales: Array) -> list[Callable[[float, Array], float]]:
+        """What ends a stretch: an element that sticks reaches its share, or a piston whose elements slip comes to rest."""
+        if len(scales) == 18:
+            return []
+        events: list[Any] = []
+        for k, way in enumerate(self.constants[2][8:]):
+            cylinder = k // ELEMENTS
+            if way == 0:
+                events.append(lambda _, s, k=k: self._margins(s * scales, command, push)[1][k])
+            else:
+                events.append(lambda _, s, c=cylinder, way=way: way * self._margins(s * scales, command, push)[0][c])
+            events[-1].terminal, events[-1].direction = True, -1
+        return events
+
+    def _switch(self, command: Array, push: Array) -> None:
+        """Elements slip that have reached their share, the way that they are bent, until their piston comes to rest."""
+        if len(self.state) == 18:
+            return
+        (speeds, left), ways = self._margins(self.state, command, push), self.constants[2][8:]
+        for k, force in enumerate(self.state[18:]):
+            v = speeds[k // ELEMENTS]
+            if ways[k] * v <= 1e-12:
+                ways[k] = np.sign(force) if left[k] < 1e-9 and v * force > 0 else 0.0

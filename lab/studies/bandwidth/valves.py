@@ -4,21 +4,27 @@ Inverse dynamics of the true rig along the declared motion, with its friction (L
 asked for and air as (6)-(10) have it, give the active flow that each cylinder needs at every instant:
     L = J^T (m a - m g - Fu) + friction,    qA = (dL/dt + K v) l/(2 k r T)
 Of all pressurisation flows the one is taken that needs the smallest opening u of both valves. Spools follow with the lag tau,
-so the command is u + tau du/dt, and it is possible where that stays within 1. The temperature of the air is left out. A
-controller that is allowed an error may get further.
+so the command is u + tau du/dt, and it is possible where that stays within 1. What goes beyond full flow counts as so much
+more opening. The temperature of the air is left out. A controller that is allowed an error may get further.
 """
+
+import math
 
 import numpy as np
 
 from baselines.estimation import dry_friction, reference_friction
 from baselines.impedance import Complex, Impedance
-from baselines.valve_inverse import CLEARANCE, air_at, driving_flows, stiffness_of
+from baselines.valve_inverse import CLEARANCE, air_at, driving_flows, stiffness_of, valve_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics import control_model
+from birthsim_env.physics.characteristic import common_opening
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.geometry import inverse_geometry, jacobian, joint_force
 from birthsim_env.physics.rig.parameters import Parameters
+
+CROSSING = 1e-3
+"""Part of the conductance over which the overlap is crossed: what a controller that renders exactly could not do without."""
 
 STEP, SETTLED = 1e-3, 2.0
 """s: of the inverse dynamics, and after which the bristles have forgotten how they began."""
@@ -52,8 +58,15 @@ def _commanded(load: Array, position: Array, speed: Array, stiffness: Array, p: 
                 active = control_model.active_flow_for(rate, stiffness_of(air, p), v, stroke, p.index, p.gas * p.temperature)
                 fill_p, drain_p = driving_flows(air.pp, p)
                 fill_n, drain_n = driving_flows(air.pn, p)
-                driven = fill_p / length_p + drain_n / length_n if active > 0.0 else drain_p / length_p + fill_n / length_n
-                last, opening = opening, active / max(0.5 * p.conductance * stroke * driven, 1e-12)
+                valve_p, valve_n, opens = valve_of(2 * k, p), valve_of(2 * k + 1, p), active > 0.0
+                driven_p = (fill_p if opens else drain_p) / length_p
+                driven_n = (drain_n if opens else fill_n) / length_n
+                edge_p = valve_p.supply if opens else valve_p.exhaust
+                edge_n = valve_n.exhaust if opens else valve_n.supply
+                driven = max(driven_p + driven_n, 1e-12)
+                part = abs(active) / max(0.5 * p.conductance * stroke * driven, 1e-12)
+                opened = common_opening(min(part, 1.0), driven_p / driven, edge_p, edge_n, CROSSING) + max(part - 1.0, 0.0)
+                last, opening = opening, math.copysign(opened, active)
                 if t * STEP > SETTLED + STEP:
                     most = max(most, abs(opening + p.tau * (opening - last) / STEP))
             largest[k, i] = most

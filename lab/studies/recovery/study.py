@@ -39,13 +39,13 @@ def _shown(content: Content, name: str) -> dict[str, str]:
 
 
 def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> list[str]:
-    """Markdown: per parameter how many rigs' logs tell it, and of these error and interval."""
+    """Markdown: per parameter of the results how many rigs' logs tell it, and of these error and interval."""
     lines = [
         "| parameter | randomised from | told in | error: median | 95th percentile | largest | half interval: median "
         "| true value inside |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for one in FREE_PARAMETERS:
+    for one in (one for one in FREE_PARAMETERS if all(one.name in result["rows"] for result in results)):
         rows = [result["rows"][one.name] for result in results]
         told = [row for row in rows if row["told"]]
         low, high = ranges.get(one.name, 2 * [value_of(Parameters(), one.name)])

@@ -88,7 +88,7 @@ static inline double coulomb(double v, double p_p, double p_n, double atmosphere
 
 /* Friction of a piston, N, and the rate of its bristle, m/s. */
 static inline double friction(double v, double z, double fc, double fv, const row *p, int i, double *bristle) {
-    int lugre = p[LUGRE][i] > 0.5, has_bristle = p[LUGRE][i] + p[ELASTO_PLASTIC][i] > 0.5;
+    int lugre = p[LUGRE][i] > 0.5, has_bristle = p[BRISTLED][i] > 0.5;
     double ratio = v / p[STRIBECK][i], fs = p[STATIC_RATIO][i] * fc;
     double level = fmax(fc + (fs - fc) / (1.0 + ratio * ratio), SMALLEST_LEVEL);
     double rate = bristle_rate(v, z, level, p[S0][i], lugre, p[BREAKAWAY][i], p[STEEPNESS][i]);

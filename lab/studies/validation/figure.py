@@ -7,13 +7,14 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from baselines.figures.style import COLUMN, MARKERS, STYLE, headline, legend_below, look, save
+from baselines.identification.valve_table import parts_of
 from lab.studies.validation.seals import BARS
-from lab.studies.validation.valve import characteristic
+from lab.studies.validation.tubes import FITTED
 
 
 def validation_figure(found: dict[str, Any], folder: Path) -> list[Path]:
     """A picture a subject."""
-    drawn = {"seals": _seals, "valve": _valve}
+    drawn = {"seals": _seals, "valve": _valve, "tubes": _tubes}
     return [path for subject in found for path in drawn[subject](found[subject], folder)]
 
 
@@ -40,7 +41,7 @@ def _valve(found: dict[str, Any], folder: Path) -> list[Path]:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(COLUMN, 2.6), layout="constrained")
         openings = np.linspace(0, 1, 201)
-        fitted = characteristic(openings, found["overlap"], found["curvature"])
+        fitted = parts_of(openings, found["overlap"], found["curvature"], found["share"])
         axes.plot(openings, openings, **look(2, markers=False), label="linear")
         axes.plot(openings, fitted, **look(1, markers=False), label="overlap and curvature")
         axes.plot(found["openings"], found["catalogue"], **{**look(0), "linestyle": ""}, label="catalogue, ±10 %")
@@ -52,3 +53,18 @@ def _valve(found: dict[str, Any], folder: Path) -> list[Path]:
         )
         legend_below(figure)
         return save(figure, folder, "validation_valve")
+
+
+def _tubes(found: dict[str, Any], folder: Path) -> list[Path]:
+    """Errors by length, those of tubes that were fitted apart."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(COLUMN, 2.4), layout="constrained")
+        for k, (words, fitted) in enumerate((("fitted", True), ("foretold", False))):
+            chosen = {int(length): value for length, value in found["by_length"].items() if (int(length) in FITTED) == fitted}
+            axes.bar(list(chosen), list(chosen.values()), color=look(k)["color"], width=0.6, label=words)
+        axes.set(xlabel="length of the tube (m)", ylabel="error (bar RMS)", xticks=[int(one) for one in found["by_length"]])
+        headline(
+            figure, f"Pressures at both ends of tubes that were not fitted are foretold within {found['foretold']:.2f} bar RMS"
+        )
+        legend_below(figure)
+        return save(figure, folder, "validation_tubes")

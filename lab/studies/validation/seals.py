@@ -68,7 +68,7 @@ def _driven(moved: Array, numbers: Array, lugre: bool, found: Array) -> None:
     deflection, steepness = 0.0, 1.0 / (1.0 - BREAKAWAY)
     for k in range(moved.shape[1]):
         speed, rate = moved[SPEED, k], 0.0
-        coulomb = numbers[F0] + numbers[PER_BAR] * moved[PRESSURE, k]
+        coulomb = friction.pressed_level(numbers[F0], numbers[PER_BAR], moved[PRESSURE, k], 0.0, 0.0)
         weakness = friction.inverse_level(speed, coulomb, numbers[RATIO] * coulomb, numbers[STRIBECK])
         for _ in range(SUBSTEPS):
             rate = friction.bristle_rate_by_law(speed, deflection, weakness, numbers[STIFFNESS], lugre, BREAKAWAY, steepness)

@@ -14,7 +14,7 @@ from birthsim_env.physics.rig.values import shown
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.studies.validation import seals, tables, valve
+from lab.studies.validation import seals, tables, tubes, valve
 
 
 def _hashes(data: Path, files: Iterable[Path]) -> dict[str, str]:
@@ -33,10 +33,15 @@ def _tasks(options: Options) -> dict[Any, Task]:
             tasks["seals", seal] = Task(f"seal-{seal}", seals.measure, {"data": str(data), "seal": seal, "files": files})
     if files := _hashes(data, [data / valve.FILE]):
         tasks["valve", ""] = Task("valve", valve.measure, {"data": str(data), "files": files})
+    wanted = [
+        tubes.files_of(data, length, bar, way) for length in tubes.LENGTHS for bar in tubes.SUPPLIES for way in tubes.WAYS
+    ]
+    if all(wanted) and (files := _hashes(data, (file for each in wanted for file in each))):
+        tasks["tubes", ""] = Task("tubes", tubes.measure, {"data": str(data), "files": files})
     if not options.data or not tasks:
         raise ValueError(
             f"--data = {shown(options.data)} has no measured data that the study knows; "
-            f"allowed: a folder with {seals.FOLDER}/ or {valve.FILE}, as docs/validation.md says"
+            f"allowed: a folder with {seals.FOLDER}/, {tubes.FOLDER}/ or {valve.FILE}, as docs/validation.md says"
         )
     return tasks
 
@@ -67,7 +72,7 @@ STUDY = Study(
     {"data": ""},
     _tasks,
     _kept,
-    {"levels": "N", "own": "N", "one_level": "N", "by_pressure": "N", "foretold": "N", **seals.UNITS, "fastest": "m/s"},
+    {"levels": "N", "own": "N", "one_level": "N", "by_pressure": "N", **seals.UNITS, "fastest": "m/s", **tubes.UNITS},
     _shown,
     _pictures,
     words={"data": "folder with the measured data, as docs/validation.md says"},

@@ -4,11 +4,12 @@ from typing import Any
 
 from lab.engine.tables import markdown
 from lab.studies.validation.seals import BARS
+from lab.studies.validation.tubes import FITTED
 
 
 def tables(found: dict[str, Any]) -> dict[str, str]:
     """Tables by subject."""
-    makers = {"seals": _seals, "valve": _valve}
+    makers = {"seals": _seals, "valve": _valve, "tubes": _tubes}
     return {subject: makers[subject](found[subject]) for subject in found}
 
 
@@ -51,3 +52,24 @@ def _valve(found: dict[str, Any]) -> str:
         ["two numbers, fitted", *(f"{found[name]:.3f}" for name in ("overlap", "curvature")), f"{100 * found['largest']:.1f}"],
     ]
     return markdown(rows)
+
+
+def _tubes(found: dict[str, Any]) -> str:
+    """Errors by length, and what was fitted."""
+    lengths = found["by_length"]
+    own = found["parameters"]
+    named = ", ".join(f"{length}" for length in FITTED)
+    errors = [
+        ["tube", *(f"{length} m" for length in lengths), f"fitted on: {named} m", "foretold: the others", "all"],
+        [
+            "error, bar RMS",
+            *(f"{value:.2f}" for value in (*lengths.values(), *(found[name] for name in ("fitted", "foretold", "all")))),
+        ],
+    ]
+    numbers = [
+        ["bore of the tube, mm", "filling, m3/(s Pa)", "venting, m3/(s Pa)", "lag of the valve, ms"],
+        [f"{1e3 * own['bore']:.1f}", f"{own['filling']:.1e}", f"{own['venting']:.1e}", f"{1e3 * own['lag']:.1f}"],
+    ]
+    return "\n\n".join(
+        [markdown(errors), "What was fitted, beside a dead time for each supply pressure and way:", markdown(numbers)]
+    )

@@ -62,10 +62,9 @@ def test_every_number_of_the_plant_reaches_a_row() -> None:
 
 def test_who_reads_what() -> None:
     rig = Parameters()
-    assert parameters_read(lambda one: one.mechanics.mass + one.tube_rate, rig) == {
+    assert parameters_read(lambda one: one.mechanics.mass + one.chambers.whole_dead_volume, rig) == {
         "mechanics.mass",
-        "chambers.tube_length",
-        *("air.heat_capacity_ratio", "air.gas_constant", "air.temperature"),
+        *(f"chambers.{name}" for name in ("dead_volume", "tube_length", "tube_diameter")),
     }
     assert parameters_read(lambda one: one.cylinder1.area_p, rig) == {"cylinder1.piston_diameter"}
 

@@ -79,9 +79,9 @@ def test_columns_of_the_kernels_follow_their_names() -> None:
     expected |= {"d_squares": 0.35**2 + 0.25**2, "d_product": 2 * 0.35 * 0.25, "perimeter1": math.pi * 0.025}
     expected |= {"leakage": 0.005 * 3.9e-9, "index": 1.2, "breakaway": 0.7, "steepness": 1 / 0.3}
     assert {name: column[name] for name in expected} == pytest.approx(expected, rel=1e-14)
-    for law in LAWS:
+    for law in (*LAWS, "gms"):
         column = dict(zip(PARAMETER_NAMES, parameter_column(rig.replace({"friction.law": law})), strict=True))
-        assert (column["lugre"], column["elasto_plastic"]) == (law == "lugre", law == "elasto_plastic")
+        assert (column["lugre"], column["gms"], column["bristled"]) == (law == "lugre", law == "gms", law != "coulomb")
     both = parameter_array([Parameters(), rig], 2)
     np.testing.assert_array_equal(both, np.stack([parameter_column(Parameters()), parameter_column(rig)], axis=1))
     np.testing.assert_array_equal(parameter_array(rig, 3), np.repeat(both[:, 1:], 3, axis=1))
