@@ -28,7 +28,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     The policy drives four servovalves. The end effector should follow a target, and give way like a spring to the hand that
     pushes it. So it should stay on the *compliant target* xk = xt + Fx/Kclx, yk = yt + Fy/Kcly (19), where Kclx and Kcly are
     the stiffness asked for. The plant is that of Herzig et al. (IROS 2015) with temperature, dead volume, leakage, spool lag
-    and LuGre friction. It is integrated by Runge-Kutta steps of 0.25 ms.
+    and LuGre friction. It is integrated by Runge-Kutta steps of 1/3 ms.
 
     | id | experiment | s |
     |---|---|---|

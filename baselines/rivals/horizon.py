@@ -10,6 +10,7 @@ the end effector's distance from the motion, its speed relative to it, and the e
 nodes the changes of the commanded flows. Each is divided by its tolerance.
 """
 
+from baselines.rivals.classical import STAGES, ahead_of, weight_of
 from baselines.valve_inverse import CylinderAir, air_at, stiffness_of
 from birthsim_env.gradients.derivatives import reverse
 from birthsim_env.gradients.graph import Graph, Value
@@ -19,7 +20,6 @@ from birthsim_env.gradients.tracing import call
 from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
-from birthsim_env.physics.classical import STAGES, ahead_of, weight_of
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows

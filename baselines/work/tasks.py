@@ -22,7 +22,6 @@ from birthsim_env.endings import later_signals
 from birthsim_env.files import finite, write_json
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
-from birthsim_env.physics.step import DEFAULT, METHOD
 
 Result = dict[str, Any]
 
@@ -51,10 +50,8 @@ class Task:
 
 
 def code_stamp(work: Callable[..., Any], used: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:
-    """What computes: the package's version, a hash of all that ``work`` and the entries ``used`` call, its libraries, and the
-    step of integration where that is not the default."""
-    step = {} if METHOD == DEFAULT else {"step": METHOD}
-    return {"version": birthsim_env.__version__, "called": _digest(called_by([work], used)), **_libraries(), **step}
+    """What computes: the package's version, a hash of all that ``work`` and the entries ``used`` call, and its libraries."""
+    return {"version": birthsim_env.__version__, "called": _digest(called_by([work], used)), **_libraries()}
 
 
 @cache

@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from birthsim_build.code.drawing import bits, fractions, seeded, whole
+from birthsim_build.code.drawing import bits, uniform
 from birthsim_env.loop.rows import World
 from birthsim_env.loop.stage import scratch, table2
 from birthsim_env.loop.world import Start
@@ -44,16 +44,17 @@ def begin(world: World, seen: int, own: Start, constants: int, tables: int, lane
 class Symbolic:
     """``Streams`` of one lane whose numbers are symbols of a ``graph``; a kernel of these ``lines`` draws them into rows."""
 
-    def __init__(self, graph: Graph, part: str) -> None:
-        self.graph, self.lines, self._part = graph, list[str](), part
+    def __init__(self, graph: Graph, part: str, stream: int) -> None:
+        self.graph, self.lines, self._part, self._stream, self._drawn = graph, list[str](), part, stream, 0
 
     def generators(self) -> Any:
         """Asked for by what draws lane by lane."""
         raise ValueError(f"{self._part}, drawn in Python; allowed on a device: what draws for all lanes at once")
 
-    def _drawn(self, count: int, line: str) -> Any:
+    def _next(self, kind: str, count: int, rows: str = "") -> Any:
         first = rows_in(self.graph)
-        self.lines.append(line.format(first=first, beyond=first + count))
+        self.lines.append(f"{kind}(own, {self._stream}, {self._drawn}, drawn, {first}{rows}, n)")
+        self._drawn += count
         values = np.empty((count, 1), dtype=object)
         values[:, 0] = [self.graph.input("drawn", first + k) for k in range(count)]
         return values.view(Unknown)
@@ -61,17 +62,13 @@ class Symbolic:
     def uniform(self, low: float = 0.0, high: float = 1.0, size: int | tuple[int, ...] = ()) -> Any:
         """``Streams.uniform``."""
         shape = (size,) if isinstance(size, int) else size
-        drawn = self._drawn(math.prod(shape), "fractions(state, drawn, {first}, {beyond}, n)")
+        count = math.prod(shape)
+        drawn = self._next("uniform", count, f", {count}")
         return (float(low) + (float(high) - float(low)) * drawn).reshape(*shape, 1)
 
-    def integers(self, low: int, high: int | None = None, dtype: type = np.int64) -> Any:
+    def integers(self, high: int, dtype: type) -> Any:
         """``Streams.integers``."""
-        first, beyond = (0, low) if high is None else (low, high)
-        if dtype is np.uint64:
-            return self._drawn(1, "bits(state, drawn, {first}, n)")[0]
-        if beyond - first == 1:
-            return np.full(1, first)
-        return self._drawn(1, f"whole(state, drawn, {{first}}, {first}, {beyond - first}, n)")[0]
+        return self._next("bits", 1)[0]
 
 
 def rows_in(graph: Graph) -> int:
@@ -92,7 +89,7 @@ def drawing(simulation: Simulation) -> Stage:
     placed = {key_of(table) for stage in pieces_of(simulation).stages for table in stage.tables}
     for number, name in enumerate(STREAMS):
         part = parts.get(name)
-        streams: Any = Symbolic(graph, f"{name} = {type(part).__name__}")
+        streams: Any = Symbolic(graph, f"{name} = {type(part).__name__}", number)
         if part is not None:
             for table, symbols in _begun(part, placed, streams):
                 written = [(row, value) for row, value in enumerate(symbols.reshape(-1)) if value is not None]
@@ -102,11 +99,10 @@ def drawing(simulation: Simulation) -> Stage:
             rig = draw_rig(simulation.parameters, simulation.ranges, streams)
             rows = (value[0] if np.ndim(value) else float(value) for value in rows_of(rig))
             outputs += [("rig", row, value) for row, value in enumerate(rows)]
-        body += [f"seeded(own, {number}, state, n)", *streams.lines] if streams.lines else []
+        body += streams.lines
     names = [f"table{k}" for k in range(len(tables))]
     views = [f"table2(tables, {k})[:, mine]" for k in range(len(tables))]
-    room = f"scratch({max(1, rows_in(graph))}), scratch(5).view(np.uint64)"
-    body = [f"mine, drawn, state = slice(lane, lane + n), {room}", *body]
+    body = [f"mine, drawn = slice(lane, lane + n), scratch({max(1, rows_in(graph))})", *body]
     body += [f"fill({', '.join(['drawn', 'world.rig', *views, 'n'])})", "return 0"]
     text = HEAD + loop(graph, "fill", ["drawn", "rig", *names], outputs) + BEGIN + "".join(f"    {line}\n" for line in body)
     return Stage(module_of(text).begin, memory=simulation.start, tables=tuple(tables))

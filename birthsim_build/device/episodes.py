@@ -19,6 +19,7 @@ from birthsim_env.episodes import Episodes, start_of
 from birthsim_env.loop.pipeline import Pipeline
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.loop.world import AT_PLACE, Start
+from birthsim_env.parts.drawn.seeding import STREAMS, stream_key
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.registry import register
@@ -44,11 +45,8 @@ class DeviceEpisodes(Episodes):
 
     def seed(self, seed: int | list[int | None] | None, generator: np.random.Generator) -> None:
         super().seed(seed, generator)
-        try:
-            words = np.array(self._seeds, dtype=np.uint64)
-        except OverflowError:
-            raise ValueError(f"seed = {max(self._seeds)}; allowed with a device: below 2^64") from None
-        self._entropy = self.arrays.asarray(words.view(np.int64))
+        entropy = np.array([stream_key(one, 0, STREAMS[0])[0] for one in self._seeds], dtype=np.uint64)
+        self._entropy = self.arrays.asarray(entropy.view(np.int64))
 
     def begin(self, lanes: Any, options: dict[str, Any] | None = None, again: bool = False) -> None:
         position, xp = start_of(options), self.arrays

@@ -22,12 +22,12 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.step import STEP
 
 RELAXATION_LIMIT = STEP.relaxation_limit
-"""1/s. The bristle relaxes at s0 |v| / G; above this rate (about 2 m/s) it has long slid, and the rate is held so that the
+"""1/s. The bristle relaxes at s0 |v| / G; above this rate (about 1 m/s) it has long slid, and the rate is held so that the
 explicit integrator stays stable. The steady deflection G/s0 is unchanged."""
 
 ELASTO_PLASTIC_LIMIT = STEP.elasto_plastic_limit
-"""1/s. The same for the elasto-plastic law: as alpha rises, its rate falls several times more steeply than LuGre's, and at
-8000 1/s Runge-Kutta steps of 0.25 ms would stall at two thirds of the steady deflection instead of reaching it."""
+"""1/s. The same for the elasto-plastic law: as alpha rises, its rate falls several times more steeply than LuGre's, so that
+with too high a limit steps would stall short of the steady deflection instead of reaching it."""
 
 SMALLEST_LEVEL = 1e-9
 """N. Keeps s0 |v| / G finite where the friction level is zero; the bristle then carries no force."""

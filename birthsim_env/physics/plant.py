@@ -57,7 +57,7 @@ class Plant:
     Notes
     -----
     ``state`` (18, N), with the rows of ``STATE_NAMES``, SI units, may be read and written. It starts at mid stroke, at rest,
-    with pressures that balance the weight, and is integrated by Runge-Kutta steps of 0.25 ms. The equations are those of
+    with pressures that balance the weight, and is integrated by Runge-Kutta steps of 1/3 ms. The equations are those of
     Herzig et al., IROS 2015, doi 10.1109/IROS.2015.7353583; each file of ``birthsim_env/physics`` names its further sources.
 
     Examples

@@ -34,7 +34,7 @@ def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
     envs = [made(where, case, 33, max_episode_steps=3) for where in ("cpu", device)]
     assert_same_run(*envs, 8, staggered=True)
     # Anywhere, by seeds of 64 bits, and again by the seeds of before.
-    for given in ({"seed": [2**64 - 1 - k for k in range(33)]}, {"options": {"position": (0.51, 0.01)}}):
+    for given in ({"seed": [2**64 + 16 - k for k in range(33)]}, {"options": {"position": (0.51, 0.01)}}):
         assert_equal(*(env.reset(**given)[0] for env in envs))
     assert_equal(*(env.unwrapped.plant_state for env in envs))
 
@@ -81,8 +81,6 @@ def test_what_no_device_draws_is_refused_by_name():
         with pytest.raises(ValueError, match=said):
             made("host", "circle ideal", 2, **{name: part})
     env = made("host", "nothing drawn", 2)
-    with pytest.raises(ValueError, match=rf"seed = {2**64}; allowed with a device: below 2\^64"):
-        env.reset(seed=[2**64, 0])
     with pytest.raises(ValueError, match=r"position = \(2, 0\) m is unreachable"):
         env.reset(seed=0, options={"position": (2.0, 0.0)})
 

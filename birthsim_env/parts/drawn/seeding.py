@@ -3,6 +3,7 @@
 Episode ``e`` of a lane seeded ``s`` depends on s and e alone, never on what happened in earlier episodes.
 """
 
+import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -15,9 +16,18 @@ F = TypeVar("F", bound=Callable[..., Any])
 STREAMS = ("parameters", "reference", "user_force", "stiffness", "sensors")
 
 
+def stream_key(lane_seed: int, episode: int, name: str) -> tuple[int, int]:
+    """The key of one random part (one of ``STREAMS``) for one episode of one lane: two words of 64 bits.
+
+    A seed below 2^64 is a word as it is; of a larger one a hash takes its place."""
+    large = lane_seed >= 2**64
+    seed = int.from_bytes(hashlib.sha256(str(lane_seed).encode()).digest()[:8], "little") if large else lane_seed
+    return seed, len(STREAMS) * episode + STREAMS.index(name)
+
+
 def stream(lane_seed: int, episode: int, name: str) -> np.random.Generator:
-    """Generator of one random part (one of ``STREAMS``) for one episode of one lane."""
-    return np.random.default_rng(np.random.SeedSequence(lane_seed, spawn_key=(episode, STREAMS.index(name))))
+    """NumPy's generator of the stream with this ``stream_key``."""
+    return np.random.Generator(np.random.Philox(key=np.array(stream_key(lane_seed, episode, name), dtype=np.uint64)))
 
 
 def lane_seeds(seed: int | list[int | None] | None, num_envs: int, generator: np.random.Generator) -> list[int]:
@@ -51,6 +61,11 @@ def draw(value: Range, rng: np.random.Generator) -> float:
         low, high = checked_range("range", value, "SI")
         return rng.uniform(float(low), float(high))
     return float(value)
+
+
+def whole(low: int, beyond: int, rng: Any) -> Any:
+    """A whole number in [low, beyond), all alike but for some 2^-53, from a generator, or one per lane from ``Streams``."""
+    return low + np.floor((beyond - low) * rng.uniform())
 
 
 def vectorised(method: F) -> F:

@@ -7,7 +7,7 @@ import numpy as np
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage, table1, table2, table3
-from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
+from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised, whole
 from birthsim_env.parts.hands.user_forces import MOST, STRONGEST, UserForce, knot_before
 from birthsim_env.parts.references import TURNED
 from birthsim_env.physics.compiled import exact
@@ -116,7 +116,7 @@ class Contractions(UserForce):
         least, most = self.pushes
         for own in self._own:
             amplitude, push = draw(self.amplitude, rng), draw(self.push, rng)
-            put(own, lane, (amplitude, push, rng.integers(least, most + 1) + (1 - least)))
+            put(own, lane, (amplitude, push, whole(1, most - least + 2, rng)))
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces, heading = np.empty((time.shape[0], 2, time.shape[1])), Heading(self._heading)

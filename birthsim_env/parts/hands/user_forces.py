@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import FORCE, MOTION, TIME, Seen, World
 from birthsim_env.loop.stage import Stage, Staged, table1, table3
-from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
+from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised, whole
 from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.parts.times import Timed, timed
 from birthsim_env.physics.compiled import exact
@@ -271,5 +271,5 @@ class Ramp(ForceProfile):
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         size = draw(self.amplitude, rng)
-        x, y = exact.direction(rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng))
+        x, y = exact.direction(whole(0, 4, rng) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng))
         return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, size * x, size * y)]

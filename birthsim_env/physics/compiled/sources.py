@@ -16,7 +16,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from birthsim_env.physics.compiled.kept import PACKAGE, cache_folder, keep, kept
-from birthsim_env.physics.step import DEFAULT, METHOD
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "lab")
@@ -112,10 +111,8 @@ def files_of(*packages: str) -> list[Path]:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not.
-
-    Another step of integration than the default has another hash."""
-    digest = hashlib.sha256(b"" if METHOD == DEFAULT else METHOD.encode())
+    """SHA-256 of the code of a source file and of every file of this project that it imports, directly or not."""
+    digest = hashlib.sha256()
     for place, file in sorted((_place(file), file) for file in dependencies([path], ASIDE)):
         digest.update(f"{place}{source(file).code}".encode())
     return digest.hexdigest()

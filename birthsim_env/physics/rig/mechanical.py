@@ -57,24 +57,22 @@ class Cylinder(Section):
     coulomb_friction: float = parameter(
         "N",
         "Coulomb friction Fc, with both chambers at atmospheric pressure where it grows with theirs",
-        default=12.0,
-        source="assumed, 4-5 % of the rated force",
+        default=8.7,
+        source="assumed: with pressure_friction at mid pressures 12 N, 4-5 % of the rated force",
         least=0,
         most=1e5,
-        range=(6, 25),
+        range=(3, 21),
         identified=Prior(0.7),
         row="fc",
     )
     pressure_friction: float = parameter(
         "N/Pa",
         "growth of Coulomb friction with the sum of both gauge pressures",
-        default=0.0,
-        source="0.23 to 0.91 N/bar of four seals of 25 mm, Zillen 2021",
+        default=5e-6,
+        source="0.23 to 0.91 N/bar fitted to four seals of 25 mm that Zillen 2021 measured; docs/validation.md",
         least=0,
         most=1e-3,
-        option=True,
         range=(2e-6, 9e-6),
-        on_request=True,
         row="fp",
     )
     direction_asymmetry: float = parameter(
@@ -238,7 +236,6 @@ class Friction(Section):
         least=1,
         most=5e5,
         range=(5e3, 5e5),
-        on_request=True,
         logarithmic=True,
         identified=Prior(0.7),
         row="s0",

@@ -75,7 +75,7 @@ class Parameters:
 
     geometry: Geometry = Geometry()
     cylinder1: Cylinder = Cylinder()
-    cylinder2: Cylinder = Cylinder(stroke=0.400, coulomb_friction=15.0)
+    cylinder2: Cylinder = Cylinder(stroke=0.400, coulomb_friction=11.7)
     mechanics: Mechanics = Mechanics()
     friction: Friction = Friction()
     chambers: Chambers = Chambers()

@@ -32,13 +32,13 @@ class Curve(NamedTuple):
 
 
 LINEAR = Curve(0.0, 0.0)
+"""A valve whose flow is proportional to its opening."""
 MPYE_5_M5 = Curve(0.11, 0.43)
 """The paper's valve, MPYE-5-M5-010-B, fitted to its catalogue with 6 bar before and 5 bar behind it, as table 2-2 of Y. Zhu,
 PhD thesis, Vanderbilt 2006, has it: at most 1.8 % of full flow away."""
 TOLERATED = Curve(*((0.9 * value, 1.1 * value) for value in MPYE_5_M5))
 """The maker promises the flow within 10 %."""
-DEFAULT = LINEAR
-CURVE = "0; 0.11 and 0.43 in the catalogue of an MPYE-5-M5-010-B, within 10 %"
+CURVE = "catalogue of the paper's MPYE-5-M5-010-B, within 10 %"
 
 
 @dataclass(frozen=True)
@@ -89,52 +89,44 @@ class Valves(Section):
     supply_overlap: float = parameter(
         "-",
         "overlap d of the edge to the supply: opening of the spool up to which it stays shut",
-        default=DEFAULT.overlap,
+        default=MPYE_5_M5.overlap,
         source=CURVE,
         least=0,
         most=0.5,
-        option=True,
         range=TOLERATED.overlap,
-        on_request=True,
         identified=Prior(5.0, scale=0.01),
         row=None,
     )
     supply_curvature: float = parameter(
         "-",
         "curvature c of the edge to the supply: how much steeper than on average its flow rises beyond the overlap",
-        default=DEFAULT.curvature,
+        default=MPYE_5_M5.curvature,
         source=CURVE,
         least=-0.8,
         most=0.8,
-        option=True,
         range=TOLERATED.curvature,
-        on_request=True,
         identified=Prior(2.5, scale=0.1),
         row=None,
     )
     exhaust_overlap: float = parameter(
         "-",
         "overlap of the edge to the exhaust",
-        default=DEFAULT.overlap,
+        default=MPYE_5_M5.overlap,
         source=CURVE,
         least=0,
         most=0.5,
-        option=True,
         range=TOLERATED.overlap,
-        on_request=True,
         identified=Prior(5.0, scale=0.01),
         row=None,
     )
     exhaust_curvature: float = parameter(
         "-",
         "curvature of the edge to the exhaust",
-        default=DEFAULT.curvature,
+        default=MPYE_5_M5.curvature,
         source=CURVE,
         least=-0.8,
         most=0.8,
-        option=True,
         range=TOLERATED.curvature,
-        on_request=True,
         identified=Prior(2.5, scale=0.1),
         row=None,
     )

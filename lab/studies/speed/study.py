@@ -171,7 +171,7 @@ def here(seconds: float) -> Result:
     single, reference = 1 / step(speed.CIRCLE, budget), _scipy(budget)
     ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)
     rows: list[Row] = [
-        ("plant, 1024 lanes", kernel, "policy steps/s (10 ms = 40 RK4 steps)"),
+        ("plant, 1024 lanes", kernel, "policy steps/s (10 ms = 30 Runge-Kutta steps)"),
         ("per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
         ("plant, 1 lane", lane, "policy steps/s"),
         ("ratio: a lane among 1024 to a lane alone", kernel / lane, "times"),

@@ -14,13 +14,8 @@ enum { LANES = 32 };
 typedef double row[LANES];
 
 static const double LINEAR_RATIO = 0.99;         /* of pressures, above which the flow falls linearly to zero */
-#ifdef THIRD_ORDER
 static const double RELAXATION_LIMIT = 4500.0;   /* 1/s, of LuGre's bristle */
 static const double ELASTO_PLASTIC_LIMIT = 3750.0; /* 1/s, of the elasto-plastic one */
-#else
-static const double RELAXATION_LIMIT = 8000.0;
-static const double ELASTO_PLASTIC_LIMIT = 5000.0;
-#endif
 static const double SMALLEST_LEVEL = 1e-9;       /* N */
 
 /* psi of ISO 6358 at a pressure ratio Pd/Pu, in [0, 1]. */
@@ -168,26 +163,17 @@ static void stage(const row *restrict x, const row *restrict dx, row *restrict t
         }
 }
 
-/* One Runge-Kutta step, s, of n lanes, by Ralston's method of third order or the classical one; `impacts` grow to the largest
- * speed into an end stop, m/s. */
+/* One Runge-Kutta step, s, of n lanes, by Ralston's method of third order; `impacts` grow to the largest speed into an end
+ * stop, m/s. */
 static void runge_kutta(row *x, const row *u, const row *f, const row *p, row *impacts, double step, int n) {
     row dx[STATES], total[STATES], trial[STATES];
     for (int r = 0; r < STATES; r++)
         for (int i = 0; i < n; i++) total[r][i] = x[r][i];
     right_hand_side(x, u, f, p, dx, n);
-#ifdef THIRD_ORDER
     stage(x, dx, total, trial, 2.0 * step / 9.0, step / 2.0, n);
     right_hand_side(trial, u, f, p, dx, n);
     stage(x, dx, total, trial, step / 3.0, 3.0 * step / 4.0, n);
     double last = 4.0 * step / 9.0;
-#else
-    stage(x, dx, total, trial, step / 6.0, step / 2.0, n);
-    right_hand_side(trial, u, f, p, dx, n);
-    stage(x, dx, total, trial, step / 3.0, step / 2.0, n);
-    right_hand_side(trial, u, f, p, dx, n);
-    stage(x, dx, total, trial, step / 3.0, step, n);
-    double last = step / 6.0;
-#endif
     right_hand_side(trial, u, f, p, dx, n);
     for (int r = 0; r < STATES; r++)
         for (int i = 0; i < n; i++) x[r][i] = total[r][i] + last * dx[r][i];

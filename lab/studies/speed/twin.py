@@ -8,7 +8,6 @@ import numpy as np
 
 from birthsim_build.code.tools import run_tool
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES, Array
-from birthsim_env.physics.step import METHOD
 
 SOURCE = Path(__file__).with_name("twin.c")
 OPTIMISED = ("-O3", "-march=native", "-ffast-math")
@@ -36,8 +35,7 @@ class Twin:
     def __init__(self, folder: Path, options: tuple[str, ...] = OPTIMISED) -> None:
         (folder / "rows.h").write_text(rows_header())
         compiled, library = folder / "twin.o", folder / "twin.so"
-        order = ("-DTHIRD_ORDER",) if METHOD == "rk3" else ()
-        _gcc(*options, *order, "-std=c17", "-fPIC", f"-I{folder}", "-c", str(SOURCE), "-o", str(compiled))
+        _gcc(*options, "-std=c17", "-fPIC", f"-I{folder}", "-c", str(SOURCE), "-o", str(compiled))
         # Linked with -ffast-math, a library of older gcc would flush denormal numbers in the whole process that loads it.
         _gcc("-shared", str(compiled), "-lm", "-o", str(library))
         self._advance = ctypes.CDLL(str(library)).advance

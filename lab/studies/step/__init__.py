@@ -1,1 +1,0 @@
-"""Steps of integration side by side: their error, and what controllers make of it."""
