@@ -50,7 +50,7 @@ ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
 # Policies by gradients: those with a configuration of their own; environments of circle_apg.
 CONFIGURED := probe_apg circle_residual_apg circle_lab_apg
-BY_GRADIENTS := circle:Circle-v1 descent:Descent-v1 forceps:Forceps-v1 dystocia:Dystocia-v1 vacuum:Vacuum-v0
+BY_GRADIENTS := circle:Circle-v2 descent:Descent-v2 forceps:Forceps-v2 dystocia:Dystocia-v2 vacuum:Vacuum-v1
 GRADIENTS := $(foreach one,$(BY_GRADIENTS),$(firstword $(subst :, ,$(one)))_apg) $(CONFIGURED)
 HONEST := circle_honest_apg
 LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
@@ -210,8 +210,8 @@ pictures: $(READY)
 	$(BIN)/birthsim identify $(OUT)/log.parquet --out $(OUT)/rig.toml --report $(OUT)/identify
 	cp $(OUT)/identify/residuals.svg docs/identify_residuals.svg
 	$(BIN)/birthsim animate --seed 1 --out docs/forceps.webp
-	$(BIN)/birthsim animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
-	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
+	$(BIN)/birthsim animate --env BirthSIM/Circle-v2 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
+	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v1 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
 	  --out docs/vacuum.webp
 
 # Interrupted, the same command goes on. What is fresh is left as it is; birthsim study status has the seconds of each.

@@ -1,6 +1,6 @@
 """Learned residuals on top of a controller.
 
-Importing this package registers environments with a controller inside, ``BirthSIM/CircleResidual-v1`` and so on.
+Importing this package registers environments with a controller inside, ``BirthSIM/CircleResidual-v2`` and so on.
 """
 
 from importlib import import_module

@@ -42,7 +42,7 @@ class Controller(Protocol):
     ...         return np.zeros_like(measurement.pressures)
     ...     def reset(self, lanes=None):
     ...         pass
-    >>> found = birthsim.evaluate("BirthSIM/Probe-v2", Shut(), episodes=2, duration=1.0, progress=False)
+    >>> found = birthsim.evaluate("BirthSIM/Probe-v3", Shut(), episodes=2, duration=1.0, progress=False)
     >>> len(found.metrics["error_rms_x"])
     2
     """

@@ -177,7 +177,7 @@ def make_controller(name: str | os.PathLike[str], parameters: Parameters | None 
     --------
     >>> import birthsim
     >>> controller = birthsim.make_controller("pid", bandwidth=60.0)
-    >>> env = birthsim.make("BirthSIM/Circle-v1", policy_period=0.001)
+    >>> env = birthsim.make("BirthSIM/Circle-v2", policy_period=0.001)
     >>> observation, info = env.reset(seed=0)
     >>> action = controller.command(env.unwrapped.measurement, env.unwrapped.reference)
     >>> observation, reward, terminated, truncated, info = env.step(action)

@@ -90,7 +90,7 @@ class StagedController:
     >>> controller = birthsim.make_controller("pid")
     >>> isinstance(controller, birthsim.StagedController)
     True
-    >>> env = birthsim.make("BirthSIM/Circle-v1", policy_period=0.001)
+    >>> env = birthsim.make("BirthSIM/Circle-v2", policy_period=0.001)
     >>> observation, info = env.reset(seed=0)
     >>> controller.command(env.unwrapped.measurement, env.unwrapped.reference).shape
     (4,)

@@ -2,7 +2,7 @@
 
     import birthsim
 
-    env = birthsim.make("BirthSIM/Circle-v1", sensors="lab", randomize=True)
+    env = birthsim.make("BirthSIM/Circle-v2", sensors="lab", randomize=True)
 
 What is below is all that most programs need. A name is imported when it is first used, so that ``import birthsim`` is quick.
 The packages behind it, ``birthsim_env``, ``baselines``, ``agents`` and ``birthsim_build``, may be imported by themselves.

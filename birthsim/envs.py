@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import agents as agents  # registers ids with a controller inside
+from birthsim_env.ids import environment_ids
 from birthsim_env.physics.rig.values import near, shown
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
@@ -26,9 +27,9 @@ def environments() -> list[str]:
     --------
     >>> import birthsim
     >>> birthsim.environments()[:2]
-    ['BirthSIM/Circle-v1', 'BirthSIM/CircleResidual-v1']
+    ['BirthSIM/Circle-v2', 'BirthSIM/CircleResidual-v2']
     """
-    return sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/"))
+    return environment_ids()
 
 
 def make(environment: str, **arguments: Any) -> gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]:
@@ -62,7 +63,7 @@ def make(environment: str, **arguments: Any) -> gymnasium.Env[NDArray[np.float32
     Examples
     --------
     >>> import birthsim
-    >>> env = birthsim.make("BirthSIM/Circle-v1", sensors="lab", randomize=True)
+    >>> env = birthsim.make("BirthSIM/Circle-v2", sensors="lab", randomize=True)
     >>> observation, info = env.reset(seed=0)
     >>> observation.shape, env.action_space.shape
     ((24,), (4,))
@@ -104,7 +105,7 @@ def make_vec(environment: str, num_envs: int = 1, **arguments: Any) -> BirthSIMV
     Examples
     --------
     >>> import birthsim
-    >>> worlds = birthsim.make_vec("BirthSIM/Circle-v1", num_envs=3, randomize=True)
+    >>> worlds = birthsim.make_vec("BirthSIM/Circle-v2", num_envs=3, randomize=True)
     >>> observations, infos = worlds.reset(seed=0)
     >>> observations.shape
     (3, 24)

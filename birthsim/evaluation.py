@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import gymnasium
-
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import data, merged, overview, table
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
@@ -13,6 +11,7 @@ from birthsim.command_line.worlds import check_environment, check_world, policy_
 from birthsim.commands.evaluate import Settings
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, whole_results, write_json, write_text
+from birthsim_env.ids import environment_ids
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import load_parameters
 
@@ -21,7 +20,7 @@ def run(settings: Settings) -> None:
     """Run the episodes that the folder lacks; write and print tables."""
     settings.controller = settings.controller or (["backstepping"] if settings.policy is None else ["residual"])
     rig = load_parameters(settings.parameters)
-    if not (settings.env.startswith("BirthSIM/") and settings.env in gymnasium.registry):  # one with a law inside may be
+    if settings.env not in environment_ids():  # one with a law inside may be
         check_environment(settings.env)
     # Processes that work beside this one find an id with a controller inside by the package that registers it.
     environment = f"agents:{settings.env}" if "Residual" in settings.env else settings.env

@@ -22,7 +22,7 @@ class Command(NamedTuple):
 
 GROUPS: dict[str, dict[str, Command]] = {
     "see": {
-        "run": Command("one episode: its figures printed, its motion drawn", "--env BirthSIM/Probe-v2 --out out/run"),
+        "run": Command("one episode: its figures printed, its motion drawn", "--env BirthSIM/Probe-v3 --out out/run"),
         "live": Command("the rig in the browser; --replay plays a recording", "--compare admittance"),
         "figure4": Command("the experiment of the paper's Fig. 4", "--out out/figure4"),
         "animate": Command("two controllers beside each other, moving", "--seed 1 --out out/forceps.webp"),

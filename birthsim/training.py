@@ -121,10 +121,10 @@ def train(
     >>> import birthsim, tempfile
     >>> tiny = {"lanes": 2, "rollout": 8, "batch": 8, "epochs": 1, "hidden": (8,), "validation_lanes": 2, "validations": 1}
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     probe = {"environment": "BirthSIM/ProbeResidual-v2", "policy_period": 0.1}
+    ...     probe = {"environment": "BirthSIM/ProbeResidual-v3", "policy_period": 0.1}
     ...     trained = birthsim.train("circle", out=folder, steps=16, **probe, **tiny)
     ...     trained.policy.environment
-    'BirthSIM/ProbeResidual-v2'
+    'BirthSIM/ProbeResidual-v3'
     """
     folder = path_of(out)
     if folder is None:

@@ -1,7 +1,7 @@
 """BirthSIM: a pneumatic haptic interface as Gymnasium environments.
 
-Importing this package registers an id for every scenario, as ``BirthSIM/Circle-v1``; ``import agents`` registers those with a
-controller inside, as ``BirthSIM/CircleResidual-v1``.
+Importing this package registers an id for every scenario, as ``BirthSIM/Circle-v2``; ``import agents`` registers those with a
+controller inside, as ``BirthSIM/CircleResidual-v2``.
 """
 
 from birthsim_env.gradients.linear.linearize import balanced_pressures, linearize, linearize_lanes

@@ -1,13 +1,20 @@
 """Ids of environments: every scenario in each kind of environment, registered with Gymnasium."""
 
-from gymnasium.envs import registration
+from typing import Any, NoReturn
 
-from birthsim_env.parts.scenarios import environment_id
+from gymnasium.envs import registration
+from gymnasium.error import DeprecatedEnv
+
+from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.registry import Entry, follow
+
+NAMESPACE = "BirthSIM"
+FORMER = "birthsim_env.ids:refuse_former"
+"""Entry point of the versions that were."""
 
 
 def register_ids(kind: str, single: str, vector: str) -> None:
-    """Register an id of every scenario, also of one that is registered later.
+    """Register an id of every scenario, also of one that is registered later, and its former versions, which are refused.
 
     Parameters
     ----------
@@ -19,7 +26,23 @@ def register_ids(kind: str, single: str, vector: str) -> None:
 
     def register(scenario: Entry) -> None:
         name = environment_id(scenario.name, kind)
-        if name not in registration.registry:
-            registration.register(name, entry_point=single, vector_entry_point=vector, kwargs={"scenario": scenario.name})
+        if name in registration.registry:
+            return
+        registration.register(name, entry_point=single, vector_entry_point=vector, kwargs={"scenario": scenario.name})
+        plain, _, version = name.rpartition("-v")
+        for number in range(int(version)):
+            asked = {"scenario": scenario.name, "former": f"{plain}-v{number}", "present": name}
+            registration.register(asked["former"], entry_point=FORMER, vector_entry_point=FORMER, kwargs=asked)
 
     follow("scenario", register)
+
+
+def environment_ids() -> list[str]:
+    """All ids that make an environment, in the order of the alphabet."""
+    found = registration.registry.items()
+    return sorted(name for name, spec in found if spec.namespace == NAMESPACE and spec.entry_point != FORMER)
+
+
+def refuse_former(scenario: str, former: str, present: str, **_: Any) -> NoReturn:
+    """Raise Gymnasium's ``DeprecatedEnv``, which says what changed since a ``former`` id."""
+    raise DeprecatedEnv(f"{former} is no more: {find_scenario(scenario).changed}; allowed: `{present}`")

@@ -85,7 +85,7 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     Examples
     --------
     >>> import birthsim
-    >>> known = birthsim.reference_scores("BirthSIM/Circle-v1")
+    >>> known = birthsim.reference_scores("BirthSIM/Circle-v2")
     >>> known["shut valves"]["return"] < known["best classical law"]["return"]
     True
     """
@@ -127,8 +127,8 @@ def normalized_score(
     Examples
     --------
     >>> import birthsim
-    >>> best = birthsim.reference_scores("BirthSIM/Circle-v1")["best classical law"]["return"]
-    >>> birthsim.normalized_score("BirthSIM/Circle-v1", best)
+    >>> best = birthsim.reference_scores("BirthSIM/Circle-v2")["best classical law"]["return"]
+    >>> birthsim.normalized_score("BirthSIM/Circle-v2", best)
     100.0
     """
     known = reference_scores(environment, sensors, randomize)

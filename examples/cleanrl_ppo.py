@@ -12,7 +12,7 @@ from torch import nn
 
 import birthsim_env
 
-environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v1"
+environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v2"
 steps, seed = int(float(sys.argv[2])) if len(sys.argv) > 2 else 1_000_000, int(sys.argv[3]) if len(sys.argv) > 3 else 0
 lanes, rollout, batch, gamma, trace = 16, 128, 64, 0.99, 0.95
 torch.manual_seed(seed), torch.set_num_threads(1)

@@ -42,7 +42,7 @@ def train(device: str, updates: int, lanes: int) -> list[float]:
     torch.manual_seed(0)
     torch.set_default_device("cuda" if device == "cuda" else "cpu")
     env = gymnasium.make_vec(
-        "BirthSIM/Circle-v1",
+        "BirthSIM/Circle-v2",
         num_envs=lanes,
         randomize=True,
         autoreset_mode="SameStep",

@@ -12,7 +12,7 @@ from torch import nn
 import agents as agents  # registers ids with a controller inside
 
 given = dict(enumerate(sys.argv))
-device, environment = given.get(1, "cuda"), given.get(2, "BirthSIM/CircleResidual-v1")
+device, environment = given.get(1, "cuda"), given.get(2, "BirthSIM/CircleResidual-v2")
 steps, seed = int(float(given.get(3, 5e7 if device == "cuda" else 2e5))), int(given.get(4, 0))
 lanes, rollout, batches, passes, gamma, trace = int(given.get(5, 16384 if device == "cuda" else 64)), 64, 16, 6, 0.98, 0.95
 torch.manual_seed(seed), torch.set_default_device("cuda" if device == "cuda" else "cpu")

@@ -30,7 +30,7 @@ def train(updates: int) -> list[float]:
     """Distance from the compliant target (19) at the end of each update's horizon, mm, median over the rigs."""
     torch.set_num_threads(1)
     torch.manual_seed(0)
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=LANES, randomize=True, autoreset_mode="SameStep")
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=LANES, randomize=True, autoreset_mode="SameStep")
     worlds = Worlds(env)
     policy = make_policy(env.single_observation_space.shape[0], env.single_action_space.shape[0])
     adam = torch.optim.Adam(policy.parameters(), lr=3e-3, betas=(0.9, 0.99))

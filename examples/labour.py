@@ -8,7 +8,7 @@ pelvic axis. The file that it writes holds time, x, y and stiffness:
 writes a labour of six contractions, twenty-five times as fast as at a birth, and renders it from there. A laboratory with a
 better model puts its output into such a file instead; the commands take it too:
 
-    birthsim evaluate --env BirthSIM/Descent-v1 --reference labour.csv --stiffness labour.csv ...
+    birthsim evaluate --env BirthSIM/Descent-v2 --reference labour.csv --stiffness labour.csv ...
 
 - Driving force: pressures on the head's cross-section, ``F = pi d^2 / 4 (p_contraction + p_push)``. A contraction is a
   ``sin^4`` over its duration, and so is each push; the pushes stand in its middle.
@@ -96,7 +96,7 @@ class Labour:
     hold: float = 2e4
     """N/m; assumed."""
     start_x: float = 0.42
-    """m at station -5 cm; assumed, as in ``BirthSIM/Descent-v1``, and so are the four below."""
+    """m at station -5 cm; assumed, as in ``BirthSIM/Descent-v2``, and so are the four below."""
     start_y: float = -0.04
     heading: float = 0.0
     """rad from x."""
@@ -243,7 +243,7 @@ def main(file: str, faster: float = 25.0) -> None:
     for name in ("backstepping", "admittance-backstepping"):
         controller = make_controller(name, Parameters())
         world = {"reference": file, "stiffness": file, "duration": labour.duration / faster, "user_force": ForceProfile()}
-        result = evaluate("BirthSIM/Descent-v1", controller, name, 1, 0, False, **world)
+        result = evaluate("BirthSIM/Descent-v2", controller, name, 1, 0, False, **world)
         print(f"{name}: settled error {result.metrics['settled_rms'][0]:.3g} mm, air {result.metrics['air'][0]:.3g} l/min")
 
 

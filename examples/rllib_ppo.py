@@ -13,7 +13,7 @@ from ray.tune.registry import register_env
 
 import birthsim_env
 
-environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v1"
+environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v2"
 steps = int(float(sys.argv[2])) if len(sys.argv) > 2 else 200_000
 
 

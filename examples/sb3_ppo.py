@@ -30,7 +30,7 @@ class Report(BaseCallback):
 
 
 if __name__ == "__main__":
-    environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v1"
+    environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v2"
     steps, seed = int(float(sys.argv[2])) if len(sys.argv) > 2 else 200_000, int(sys.argv[3]) if len(sys.argv) > 3 else 0
     torch.set_num_threads(1)
     model = PPO("MlpPolicy", gym.make(environment, randomize=True), seed=seed, device="cpu")

@@ -18,7 +18,7 @@ from torchrl.objectives.value import GAE
 
 import birthsim_env
 
-environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v1"
+environment = sys.argv[1] if len(sys.argv) > 1 else "BirthSIM/Circle-v2"
 steps, lanes, batch = int(float(sys.argv[2])) if len(sys.argv) > 2 else 200_000, 16, 2048
 torch.manual_seed(0), torch.set_num_threads(1)
 native = gym.make_vec(environment, num_envs=lanes, randomize=True, autoreset_mode="Disabled")

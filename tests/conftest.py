@@ -39,7 +39,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 MUTANTS = os.environ.get("HYPOTHESIS_PROFILE") == "brief"
 
 SMALL = """[training]
-environment = "BirthSIM/ProbeResidual-v2"
+environment = "BirthSIM/ProbeResidual-v3"
 lanes = 32
 rollout = 32
 batch = 256

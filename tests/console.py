@@ -17,7 +17,7 @@ STUDIES = {
 }
 """Studies of ``birthsim study``, which tests run."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long
-RESIDUAL = "BirthSIM/ProbeResidual-v2"
+RESIDUAL = "BirthSIM/ProbeResidual-v3"
 
 OWN = """
 import numpy as np

@@ -1,6 +1,6 @@
 """Worlds that JAX differentiates: ``jax.grad`` goes through the closed loop of N lanes, also under ``jax.jit``.
 
-    worlds = Worlds(gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=256, autoreset_mode="SameStep"))
+    worlds = Worlds(gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=256, autoreset_mode="SameStep"))
     start = worlds.reset(seed=0)
 
     def loss(weights):

@@ -1,6 +1,6 @@
 """Worlds that PyTorch differentiates: ``loss.backward()`` goes through the closed loop of N lanes.
 
-    worlds = Worlds(gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=256, autoreset_mode="SameStep"))
+    worlds = Worlds(gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=256, autoreset_mode="SameStep"))
     now = worlds.reset(seed=0)
     for _ in range(10):
         now = worlds.step(now, policy(now.observation))

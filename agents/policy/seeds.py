@@ -91,7 +91,7 @@ def load_policy(policy: str | os.PathLike[str]) -> Policy:
     >>> import birthsim
     >>> policy = birthsim.load_policy("circle")
     >>> policy.environment, policy.settings.law
-    ('BirthSIM/CircleResidual-v1', 'backstepping-force-first')
+    ('BirthSIM/CircleResidual-v2', 'backstepping-force-first')
 
     It acts in an environment with its controller inside:
 

@@ -64,7 +64,7 @@ def _follow(
     ``correction`` is the believed force, N; the others are of ``info``.
     """
     env: Any = gymnasium.make_vec(
-        "BirthSIM/ProbeResidual-v2",
+        "BirthSIM/ProbeResidual-v3",
         num_envs=lanes,
         reference=trajectory,
         user_force=ForceProfile(),

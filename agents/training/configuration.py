@@ -53,7 +53,7 @@ class TrainingSettings:
     Raises ``ValueError`` naming what cannot be.
     """
 
-    environment: str = "BirthSIM/CircleResidual-v1"
+    environment: str = "BirthSIM/CircleResidual-v2"
     algorithm: str = "ppo"
     steps: int = 3_000_000
     seed: int = 0

@@ -73,7 +73,7 @@ class Evaluation:
     ``evaluate`` returns one.
 
     >>> import birthsim
-    >>> found = birthsim.evaluate("BirthSIM/Probe-v2", "admittance", episodes=2, progress=False)
+    >>> found = birthsim.evaluate("BirthSIM/Probe-v3", "admittance", episodes=2, progress=False)
     >>> sorted(found.summary()["settled_rms"])
     ['max', 'mean', 'median', 'q95']
     """
@@ -127,7 +127,7 @@ def evaluate(
     Parameters
     ----------
     environment : str
-        An id, such as ``"BirthSIM/Circle-v1"``.
+        An id, such as ``"BirthSIM/Circle-v2"``.
     controller : str, Controller or callable
         Its name, as ``make_controller`` takes it, which then assumes the rig that ``parameters`` describes; an object; or a
         function of measurement and reference. It commands at every control period.
@@ -158,7 +158,7 @@ def evaluate(
     Examples
     --------
     >>> import birthsim
-    >>> found = birthsim.evaluate("BirthSIM/Probe-v2", "admittance", episodes=2, randomize=True, progress=False)
+    >>> found = birthsim.evaluate("BirthSIM/Probe-v3", "admittance", episodes=2, randomize=True, progress=False)
     >>> found.controller, found.lost
     ('admittance', [False, False])
     >>> found.settled_error()["median"] < 1.0

@@ -6,6 +6,7 @@ from typing import Any
 import gymnasium
 
 from baselines.named import known_options, split_options
+from birthsim_env.ids import environment_ids
 from birthsim_env.physics.rig.values import near
 
 
@@ -14,7 +15,7 @@ def check_environment(name: str, residual: bool = False, given: str = "--env") -
 
     ``given`` says by what it was given: an option of a command, or ``"environment ="``.
     """
-    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and ("Residual" in one) == residual)
+    known = [one for one in environment_ids() if ("Residual" in one) == residual]
     if name not in known:
         whole = f"BirthSIM/{name}"
         asked = near(whole if whole in known else name, known)
@@ -31,7 +32,7 @@ def check_world(environment: str, **arguments: Any) -> None:
 
 
 def policy_of(environment: str) -> str:
-    """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v1`` ->
+    """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v2`` ->
     ``forceps``."""
     return environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()
 

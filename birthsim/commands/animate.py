@@ -43,7 +43,7 @@ class Settings(Parts):
     both) and error from the compliant target.
     """
 
-    env: Env = "BirthSIM/Forceps-v1"
+    env: Env = "BirthSIM/Forceps-v2"
     controller: Annotated[tuple[str, str], CONTROLLER, Parameter(alias="--controllers", metavar="NAME NAME")] = (
         "backstepping",
         "admittance-backstepping",

@@ -31,7 +31,7 @@ class Settings(Parts, Processes):
     kept, so that an interrupted run goes on.
     """
 
-    env: Env = "BirthSIM/Circle-v1"
+    env: Env = "BirthSIM/Circle-v2"
     controller: Controllers = None
     policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
     """For the controller residual: a folder that birthsim train wrote, or the name of what is shipped, such as circle."""

@@ -49,7 +49,7 @@ def record_run(
     ``picture`` is where to save what the rig looks like during the first push.
     """
     rig = load_parameters(parameters)
-    env = driven("BirthSIM/Circle-v1", controller, rig, sensors=sensors, **PICTURE)
+    env = driven("BirthSIM/Circle-v2", controller, rig, sensors=sensors, **PICTURE)
 
     def look(rows: int) -> None:
         if picture is not None and rows == round(PICTURE_TIME / rig.electronics.control_period):

@@ -10,7 +10,7 @@ from birthsim.command_line.settings import Controller, Env, Parts, Randomize, Ri
 class Settings(Parts):
     """Run one episode, print its error second by second, draw its motion."""
 
-    env: Env = "BirthSIM/Circle-v1"
+    env: Env = "BirthSIM/Circle-v2"
     controller: Controller = "admittance"
     set: Set = field(default_factory=list)
     seed: Seed = 0

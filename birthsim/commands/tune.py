@@ -5,7 +5,7 @@ units; each is a keyword of its constructor. Where low is positive the gain is s
 linear one. That holds for names of the registry and for ``path/to/file.py:Class``.
 
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
-the documented ranges. The worlds are those of ``Circle-v1``, rig and scenario drawn, and of the stiffness test of
+the documented ranges. The worlds are those of ``Circle-v2``, rig and scenario drawn, and of the stiffness test of
 ``baselines.bench.probes``, with each sensor model. The loss of a lane is in mm: on the circle the settled error, in the
 stiffness test the error of the displacement at full force plus the hunting. A lost lane costs ``WORST``, and no lane more. The
 cost is the sum over scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the
@@ -118,7 +118,7 @@ def costs(
     periods = round(seconds / rig.electronics.control_period)
     setting: dict[str, Any] = {"randomize": True, "parameters": rig, "max_episode_steps": periods, "progress": False, **own}
     for kind in sensors:
-        circle = evaluate("BirthSIM/Circle-v1", controller, "", lanes, WORLDS, sensors=kind, **setting)
+        circle = evaluate("BirthSIM/Circle-v2", controller, "", lanes, WORLDS, sensors=kind, **setting)
         if len(circle.seeds) < lanes:
             raise KeyboardInterrupt  # which ``evaluate`` has caught, to keep what is complete
         parts[f"circle, {kind}"] = robust(penalize_lost(circle.metrics["settled_rms"], circle.lost, True))
@@ -204,7 +204,7 @@ def main(settings: Settings) -> None:
         "sensors": list(sensors), "lanes": settings.lanes,
     }  # fmt: skip
     study = begun(start)
-    check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)  # which compiles: Optuna is looked for before
+    check_world("BirthSIM/Circle-v2", parameters=rig, randomize=True, **own)  # which compiles: Optuna is looked for before
     trials: list[dict[str, Any]] = []
     interrupt: KeyboardInterrupt | None = None
     print(described(rig, True))

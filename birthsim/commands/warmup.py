@@ -21,7 +21,7 @@ def main(_: Settings) -> None:
     rig, began, names = Parameters(), time.perf_counter(), compiled_names(listed=True)
     with tqdm(names, desc="compiling", unit=" controllers", leave=False) as bar:
         for name in bar:
-            env = driven("BirthSIM/Circle-v1", name, rig, sensors="lab")
+            env = driven("BirthSIM/Circle-v2", name, rig, sensors="lab")
             env.reset(seed=0)
             env.step(NO_ACTION)
             env.close()

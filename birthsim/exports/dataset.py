@@ -52,7 +52,7 @@ class Settings(Configured):
 
     to: Literal["minari"]
     """Form of the dataset."""
-    env: Env = "BirthSIM/Circle-v1"
+    env: Env = "BirthSIM/Circle-v2"
     level: Annotated[Literal["expert", "medium", "paper", "random"], Parameter(group=WORLD)] = "expert"
     """Who acts."""
     episodes: Annotated[int, whole(1, EPISODES)] = 100

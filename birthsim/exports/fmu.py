@@ -33,7 +33,7 @@ class Settings(Configured):
     """A compiled controller, else the plant alone."""
     policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
     """A residual policy instead: a folder that birthsim train wrote, or the name of what is shipped."""
-    env: Env = "BirthSIM/Circle-v1"
+    env: Env = "BirthSIM/Circle-v2"
     sensors: Sensors = "ideal"
     parameters: RigFile = None
     seed: Seed = 0

@@ -53,7 +53,7 @@ class Settings(Configured):
     to: Annotated[str, Parameter(choices=tuple(FORMS))]
     """Target; c: this processor."""
     env: Annotated[list[str], MANY, ENV, Parameter(metavar="ID...")] = field(default_factory=list)
-    """Environments, else BirthSIM/Circle-v1; not for cortex-m7."""
+    """Environments, else BirthSIM/Circle-v2; not for cortex-m7."""
     sensors: Annotated[list[str], MANY, SENSORS] = field(default_factory=list)
     """Sensor models, else ideal."""
     controller: Annotated[list[str], MANY, CONTROLLER, Parameter(metavar="NAME...")] = field(default_factory=list)
@@ -121,7 +121,7 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
         return names("scenario"), names("sensors"), compiled_names(listed=True), _shipped()
-    scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
+    scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v2"]]
     controllers = settings.controller or ([] if settings.policy else ["backstepping"])
     return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy
 

@@ -151,7 +151,7 @@ class Measurement:
     Examples
     --------
     >>> import birthsim
-    >>> worlds = birthsim.make_vec("BirthSIM/Probe-v2", num_envs=3, sensors="lab")
+    >>> worlds = birthsim.make_vec("BirthSIM/Probe-v3", num_envs=3, sensors="lab")
     >>> observations, infos = worlds.reset(seed=0)
     >>> measured = worlds.measurement
     >>> measured.pressures.shape, measured.sampled, measured.acceleration

@@ -71,7 +71,7 @@ def stepped(times: Array, stiffness: Array) -> StiffnessSchedule:
 
     Rows before 0 and after ``LONGEST`` set nothing but what is asked for at 0. A step restarts the count of settled time, as
     where a user changes the setpoint. The pneumatic stiffness stays at 4200 and
-    2100 N/m, as in ``BirthSIM/Descent-v1``.
+    2100 N/m, as in ``BirthSIM/Descent-v2``.
     """
     chosen = [0]
     for k, value in enumerate(stiffness):

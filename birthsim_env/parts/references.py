@@ -52,7 +52,7 @@ class Trajectory(Staged):
     ...     def sample(self, time):
     ...         sine, cosine, still = 0.02 * np.sin(time), 0.02 * np.cos(time), 0 * time
     ...         return np.stack([0.5 + still, sine, still, cosine, still, -sine, still, -cosine])
-    >>> env = birthsim.make("BirthSIM/Circle-v1", reference=Bob())
+    >>> env = birthsim.make("BirthSIM/Circle-v2", reference=Bob())
     >>> observation, info = env.reset(seed=0)
     >>> info["target"].tolist()
     [0.5, 0.0]
@@ -138,7 +138,7 @@ class Circle(_Planned):
     Examples
     --------
     >>> import birthsim
-    >>> env = birthsim.make("BirthSIM/Circle-v1", reference=birthsim.Circle(radius=0.03, period=5.0))
+    >>> env = birthsim.make("BirthSIM/Circle-v2", reference=birthsim.Circle(radius=0.03, period=5.0))
     >>> observation, info = env.reset(seed=0)
     >>> info["target"].tolist()
     [0.53, 0.0]
@@ -250,7 +250,7 @@ class Path(_Planned):
     --------
     >>> import birthsim
     >>> ahead = birthsim.Path(start=(0.45, 0.0), length=0.05, begins=1.0, ends=3.0)
-    >>> env = birthsim.make("BirthSIM/Forceps-v1", reference=ahead)
+    >>> env = birthsim.make("BirthSIM/Forceps-v2", reference=ahead)
     >>> observation, info = env.reset(seed=0)
     >>> info["target"].tolist()
     [0.45, 0.0]
@@ -305,7 +305,7 @@ class FixedTarget(Path):
     Examples
     --------
     >>> import birthsim
-    >>> env = birthsim.make("BirthSIM/Circle-v1", reference=birthsim.FixedTarget((0.48, 0.01)))
+    >>> env = birthsim.make("BirthSIM/Circle-v2", reference=birthsim.FixedTarget((0.48, 0.01)))
     >>> observation, info = env.reset(seed=0)
     >>> info["target"].tolist()
     [0.48, 0.01]

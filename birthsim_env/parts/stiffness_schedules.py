@@ -62,7 +62,7 @@ class StiffnessSchedule(Staged):
 
     >>> import birthsim
     >>> doubled = birthsim.StiffnessSchedule((0.0, 8.0), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
-    >>> env = birthsim.make("BirthSIM/Circle-v1", stiffness=doubled)
+    >>> env = birthsim.make("BirthSIM/Circle-v2", stiffness=doubled)
     >>> observation, info = env.reset(seed=0)
     >>> info["stiffness_setpoint"].tolist()
     [2000.0, 2000.0]

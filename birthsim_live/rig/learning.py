@@ -43,7 +43,7 @@ def worlds(lanes: int) -> Any:
     """The first ``lanes`` of all beginnings, as an environment."""
     rig = widened(Parameters(), MARGIN)
     env: Any = gymnasium.make_vec(
-        "BirthSIM/Circle-v1", num_envs=lanes, parameters=rig, randomize=True, autoreset_mode="SameStep"
+        "BirthSIM/Circle-v2", num_envs=lanes, parameters=rig, randomize=True, autoreset_mode="SameStep"
     )
     env.reset(seed=TRAINING_SEED)
     return env.unwrapped
@@ -99,7 +99,7 @@ def write_learning(folder: Path) -> None:
 def _statistics(size: int) -> tuple[Array, Array]:
     """Mean and standard deviation (``size``,) of observations, as of ``agents.training.policy_gradient``."""
     alone = ResidualSettings(law=NO_LAW).to_dict()
-    env: Any = gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=1, randomize=True, **alone)
+    env: Any = gymnasium.make_vec("BirthSIM/CircleResidual-v2", num_envs=1, randomize=True, **alone)
     _, found = observations(env, TRAINING_SEED, OBSERVED)
     mean, variance = np.zeros(size), np.zeros(size)
     mean[:SIZE], variance[:SIZE] = found[:, :SIZE].mean(axis=0), found[:, :SIZE].var(axis=0)

@@ -11,5 +11,5 @@ from baselines.driving import driving
 def pipeline() -> str:
     """What ``print(env.unwrapped.pipeline)`` says of a circle with realistic sensors under the paper's controller."""
     actuation = driving(make_controller("backstepping"), None)
-    env: Any = gymnasium.make("BirthSIM/Circle-v1", sensors="honest", actuation=actuation)
+    env: Any = gymnasium.make("BirthSIM/Circle-v2", sensors="honest", actuation=actuation)
     return f"```text\n{env.unwrapped.pipeline}\n```"

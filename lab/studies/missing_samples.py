@@ -32,7 +32,7 @@ SEED, BEGINS, AFTER, PERIOD = 991_000, 1.0, 0.5, 0.001
 
 def run(controller: str, sensors: str, signal: str | None, lasts: float, lanes: int, duration: float) -> tuple[Array, Mask]:
     """Positions (T, 2, N), m, and which heads are lost (N,), with ``signal`` NaN from ``BEGINS`` on for ``lasts`` s."""
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, randomize=True, policy_period=PERIOD)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=lanes, sensors=sensors, randomize=True, policy_period=PERIOD)
     env.reset(seed=SEED)
     rig: Parameters = env.unwrapped.parameters  # type: ignore[attr-defined]
     law, lost, path = make_controller(controller, rig), np.zeros(lanes, dtype=bool), []
@@ -51,7 +51,7 @@ def run(controller: str, sensors: str, signal: str | None, lasts: float, lanes: 
 
 def cost(controller: str, lanes: int, calls: int = 3000) -> float:
     """Time of a call of ``command`` with the guard over that without it, the least of ten turns each."""
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, sensors="lab", policy_period=PERIOD)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=lanes, sensors="lab", policy_period=PERIOD)
     env.reset(seed=SEED)
     measured, wanted = env.unwrapped.measurement, env.unwrapped.reference  # type: ignore[attr-defined]
     guarded, bare = (make_controller(controller, Parameters()) for _ in range(2))

@@ -28,7 +28,7 @@ from lab.engine.worlds import SEED, worlds
 CHOSEN = 920_000
 """First seed of the worlds on which the crossing was chosen."""
 
-HELD, MOVED = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
+HELD, MOVED = "BirthSIM/Probe-v3", "BirthSIM/Circle-v2"
 COLUMNS = {
     "held_turns": (HELD, "valve_turns", "turns of a valve, 1/s, held"),
     "moved_turns": (MOVED, "valve_turns", "moved"),

@@ -112,7 +112,7 @@ def test_pressures_beyond_supply_and_atmosphere(pressures: tuple[float, float]) 
 
 def survived(name: str, world: int) -> float:
     """Seconds until the end effector is lost on a varied circle."""
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=1, randomize=True, policy_period=1e-3)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=1, randomize=True, policy_period=1e-3)
     controller = make_controller(name, RIG)
     env.reset(seed=[world])
     for tick in range(12_000):

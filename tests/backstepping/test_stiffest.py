@@ -56,7 +56,7 @@ def test_what_counts_is_the_stiffest_direction():
 
 
 def test_a_law_inside_an_environment_refuses_too():
-    env = gymnasium.make("BirthSIM/CircleResidual-v1", parameters=LIGHT, sensors="lab")
+    env = gymnasium.make("BirthSIM/CircleResidual-v2", parameters=LIGHT, sensors="lab")
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape, dtype=np.float32)
     for _ in range(790):

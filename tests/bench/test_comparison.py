@@ -13,8 +13,8 @@ from tests.controllers.test_named_controllers import OWN
 from tests.registered import registered
 
 RIG = Parameters()
-CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
-PROBE = Conditions("BirthSIM/Probe-v2", "ideal", "nominal")
+CIRCLE = Conditions("BirthSIM/Circle-v2", "ideal", "randomised")
+PROBE = Conditions("BirthSIM/Probe-v3", "ideal", "nominal")
 INF = math.inf
 
 

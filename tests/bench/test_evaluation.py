@@ -14,7 +14,7 @@ from baselines.bench.measures import DISCOUNTS, TRACE
 from baselines.bench.metrics import UNITS, EpisodeMetrics
 from birthsim_env import Parameters
 
-PROBE, CIRCLE = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
+PROBE, CIRCLE = "BirthSIM/Probe-v3", "BirthSIM/Circle-v2"
 RIG = Parameters()
 
 

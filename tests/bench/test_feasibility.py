@@ -12,7 +12,7 @@ from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 from tests.oracles.closed_loop import FRICTIONLESS
 
-PROBE = "BirthSIM/Probe-v2"
+PROBE = "BirthSIM/Probe-v3"
 RIG = Parameters()
 STIFF = StiffnessSchedule(closed_loop=(1e5,))
 """The hand moves the place that it acts at by less than 3 mm."""
@@ -111,7 +111,7 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can():
 
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [("BirthSIM/Descent-v1", {"randomize": True}), ("BirthSIM/Circle-v1", {"user_force": "guided", "duration": 2.0})],
+    [("BirthSIM/Descent-v2", {"randomize": True}), ("BirthSIM/Circle-v2", {"user_force": "guided", "duration": 2.0})],
     ids=["randomised", "a hand with a memory"],
 )
 def test_looking_ahead_changes_nothing(name, arguments):

@@ -30,7 +30,7 @@ def record():
 def controllers(folder):
     traces = [[np.full((50, 4, 2), 1e-3 * (k + 1))] for k in range(8)]
     evaluations = [Evaluation(f"controller-of-my-own-{k}", traces=trace) for k, trace in enumerate(traces)]
-    return error_over_time(evaluations, "BirthSIM/Circle-v1, 4 episodes from seed 0, ideal sensors, --randomize all", folder)
+    return error_over_time(evaluations, "BirthSIM/Circle-v2, 4 episodes from seed 0, ideal sensors, --randomize all", folder)
 
 
 def of_result(name):
@@ -39,7 +39,7 @@ def of_result(name):
 
 DRAWINGS = {
     "figure4": lambda folder: figure4(record(), folder),
-    "episode": lambda folder: episode_figure(record(), "BirthSIM/Circle-v1, pid, seed 0, lab sensors", folder),
+    "episode": lambda folder: episode_figure(record(), "BirthSIM/Circle-v2, pid, seed 0, lab sensors", folder),
     "controllers": controllers,
     "correction": lambda folder: draw_corrections(2 * (np.arange(5.0),), 0.9, 2 * (np.ones((2, 5)).cumsum(axis=1),), folder),
 }

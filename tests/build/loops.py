@@ -59,7 +59,7 @@ def every_function():
     pieces = [beginning_with(begun(case, 2)) for case in BEGUN]
     policies = [read_policy(best_policy(scenario)) for scenario in names("policy") if scenario in names("scenario")]
     residual = [(policy.environment, policy.settings.to_dict()) for policy in policies]
-    residual += [("BirthSIM/CircleResidual-v1", given) for given in ({"sensors": "lab"}, {"stiffness": SOFT})]
+    residual += [("BirthSIM/CircleResidual-v2", given) for given in ({"sensors": "lab"}, {"stiffness": SOFT})]
     for name, given in residual:
         env = gymnasium.make_vec(name, num_envs=2, randomize=True, device="host", **given)
         pieces.append(beginning_with(env.unwrapped._episodes))

@@ -24,10 +24,10 @@ from tests.build.targets import assert_fusing_changes_nothing, assert_same_bits,
 from tests.build.test_threads import assert_exact
 
 CASES = {
-    "openings": {"id": "BirthSIM/Circle-v1"},
-    "honest sensors": {"id": "BirthSIM/Circle-v1", "sensors": "honest"},
-    "a hand that feels": {"id": "BirthSIM/Probe-v2", "user_force": "guided"},
-    "a law": {"id": "BirthSIM/CircleResidual-v1", "sensors": "lab"},
+    "openings": {"id": "BirthSIM/Circle-v2"},
+    "honest sensors": {"id": "BirthSIM/Circle-v2", "sensors": "honest"},
+    "a hand that feels": {"id": "BirthSIM/Probe-v3", "user_force": "guided"},
+    "a law": {"id": "BirthSIM/CircleResidual-v2", "sensors": "lab"},
 }
 
 

@@ -21,7 +21,7 @@ from tests.build.targets import imported, need_threads
 from tests.oracles.golden import fingerprints
 
 SEED = 2_100_000
-CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
+CIRCLE, RESIDUAL = "BirthSIM/Circle-v2", "BirthSIM/CircleResidual-v2"
 
 
 @pytest.fixture(autouse=True)
@@ -68,7 +68,7 @@ def assert_same_run(here, there, steps, **options):
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_one_code")
 @pytest.mark.parametrize(("mode", "staggered"), [("NextStep", False), ("NextStep", True), ("SameStep", True)])
-@pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v1", "honest"), (RESIDUAL, "lab")])
+@pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v2", "honest"), (RESIDUAL, "lab")])
 def test_the_bits_of_the_native_environment(mode, staggered, name, sensors, device):
     shared = {"sensors": sensors, "autoreset_mode": mode, "max_episode_steps": 4}
     assert_same_run(made("cpu", name, **shared), made(device, name, **shared), 11, staggered=staggered)

@@ -28,7 +28,7 @@ fmpy, validate_fmu = imported("fmpy"), imported("fmpy.validation").validate_fmu
 
 RIG, PERIOD = Parameters(), 1e-3
 OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 HEADERS = Path(archive.__file__).parent / "fmi_headers"
 
 

@@ -54,9 +54,9 @@ def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, ca
 
 def test_a_take_shows_the_run_of_the_environment():
     law = make_controller("backstepping", RIG)
-    driven = gymnasium.make("BirthSIM/Forceps-v1", randomize=True, policy_period=0.001, actuation=driving(law, "it"))
+    driven = gymnasium.make("BirthSIM/Forceps-v2", randomize=True, policy_period=0.001, actuation=driving(law, "it"))
     found = take(driven, 3, (0.5, 1.5), 25, lambda count: None)
-    env, law = gymnasium.make("BirthSIM/Forceps-v1", randomize=True, policy_period=0.001), make_controller("backstepping", RIG)
+    env, law = gymnasium.make("BirthSIM/Forceps-v2", randomize=True, policy_period=0.001), make_controller("backstepping", RIG)
     _, info = env.reset(seed=3)
     times, errors = [0.0], [np.hypot(*info["tracking_error"])]
     for _ in range(1500):
@@ -71,7 +71,7 @@ def test_a_take_shows_the_run_of_the_environment():
 
 def test_a_lost_run_stands_still_with_an_infinite_error():
     def taken(name):
-        env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.001, actuation=driving(make_controller(name, RIG), "it"))
+        env = gymnasium.make("BirthSIM/Forceps-v2", policy_period=0.001, actuation=driving(make_controller(name, RIG), "it"))
         return take(env, 0, (0.0, 1.5), 10, lambda count: None)
 
     found = taken("slammed-valves")

@@ -52,7 +52,7 @@ def test_what_is_mistyped_is_asked_about(monkeypatch, capsys):
 
 
 def test_an_episode_is_printed_and_drawn(monkeypatch, capsys, tmp_path):
-    status, printed, _ = call("run", monkeypatch, capsys, "--env", "BirthSIM/Probe-v2", "--out", tmp_path / "out")
+    status, printed, _ = call("run", monkeypatch, capsys, "--env", "BirthSIM/Probe-v3", "--out", tmp_path / "out")
     assert status == 0
     assert_picture(tmp_path / "out", "episode")
     rows = [line.split() for line in printed.splitlines() if re.match(r" +\d+ to +\d+ ", line)]

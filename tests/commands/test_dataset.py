@@ -6,7 +6,7 @@ import pytest
 
 from birthsim.exports.dataset import LEVELS, made, recorded
 
-PROBE = "BirthSIM/Probe-v2"
+PROBE = "BirthSIM/Probe-v3"
 
 
 @pytest.mark.parametrize("level", LEVELS)

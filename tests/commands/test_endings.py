@@ -77,7 +77,7 @@ def test_a_signal_ends_a_command_in_one_line(program, ending, said):
 
 
 BUSY = {
-    "evaluate --env BirthSIM/Probe-v2 --out out": "birthsim.evaluation.run_tasks",
+    "evaluate --env BirthSIM/Probe-v3 --out out": "birthsim.evaluation.run_tasks",
     "animate --out out.webp": "birthsim.commands.animate.take",
     "identify log.csv --out rig.toml": "birthsim.commands.identify.read_trial",
     "tune --controller pid --out out": "birthsim.commands.tune.costs",
@@ -99,7 +99,7 @@ def test_ctrl_c_before_anything_is_complete_leaves_no_results(line, tmp_path, mo
     assert {path.name for path in tmp_path.rglob("*") if path.is_file()} <= {".lock", "trials.journal"}
 
 
-@pytest.mark.parametrize(("line", "folder"), [("evaluate --env BirthSIM/Probe-v2 --out .", ""), ("train --out .", "seed_0")])
+@pytest.mark.parametrize(("line", "folder"), [("evaluate --env BirthSIM/Probe-v3 --out .", ""), ("train --out .", "seed_0")])
 def test_a_folder_has_one_process_at_a_time(line, folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     command, *options = line.split()

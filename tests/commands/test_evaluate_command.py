@@ -18,21 +18,21 @@ from tests.console import OWN, assert_picture, call, interrupted, strict
 def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys):
     out = tmp_path / "new" / "folder"
     controllers = ("--controller", "backstepping", "backstepping-weight")
-    arguments = ("--env", "BirthSIM/Probe-v2", "--episodes", "3", "--seed", "7", *controllers, "--jobs", 1)
+    arguments = ("--env", "BirthSIM/Probe-v3", "--episodes", "3", "--seed", "7", *controllers, "--jobs", 1)
     status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", out)
     assert status == 0, complained
     files = {f"error_over_time.{kind}" for kind in ("png", "svg")} | {f"evaluation.{kind}" for kind in ("csv", "json", "md")}
     assert {path.name for path in out.iterdir()} == files | {".lock", "pieces", "times.json"}
     table = (out / "evaluation.md").read_text()
-    assert table.startswith("BirthSIM/Probe-v2, 3 episodes from seed 7, ideal sensors, --randomize all")
+    assert table.startswith("BirthSIM/Probe-v3, 3 episodes from seed 7, ideal sensors, --randomize all")
     assert table.splitlines()[0] in printed
     figures = (out / "evaluation.csv").read_text().splitlines()
     assert "lost episodes,of 3,backstepping-weight,0,," in figures
     content = strict(out / "evaluation.json")
-    assert content["arguments"]["env"] == "BirthSIM/Probe-v2"
+    assert content["arguments"]["env"] == "BirthSIM/Probe-v3"
     for name, result in zip(("backstepping", "backstepping-weight"), content["results"], strict=True):
         law = make_controller(name, Parameters())
-        alone = evaluate("BirthSIM/Probe-v2", law, name, 3, 7, progress=False, randomize=True).to_dict()
+        alone = evaluate("BirthSIM/Probe-v3", law, name, 3, 7, progress=False, randomize=True).to_dict()
         assert (result["controller"], result["seeds"]) == (name, [7, 8, 9])
         assert result["episodes"] == finite(alone["episodes"])
         median, largest = (f"{result['summary']['settled_rms'][which]:.3g}" for which in ("median", "max"))
@@ -45,11 +45,11 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
 def test_evaluate_takes_a_rig_and_a_controller_from_files_and_survives_the_loss_of_every_episode(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 3.5\n")
-    world = ("--env", "BirthSIM/Probe-v2", "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
+    world = ("--env", "BirthSIM/Probe-v3", "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
     arguments = ("--episodes", 2, "--controller", f"{tmp_path}/slam.py:Slam", "--out", tmp_path / "out")
     status, printed, complained = call("evaluate", monkeypatch, capsys, *world, *arguments)
     assert status == 0, complained
-    assert "BirthSIM/Probe-v2, 2 episodes from seed 0, lab sensors, --randomize none" in printed
+    assert "BirthSIM/Probe-v3, 2 episodes from seed 0, lab sensors, --randomize none" in printed
     assert "Warning" not in complained
     assert "| lost episodes |  | 2 of 2 |" in (tmp_path / "out" / "evaluation.md").read_text()
     assert re.search(r"Slam .* 2 of 2\n", printed)
@@ -73,7 +73,7 @@ class Fails(Slam):
 def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
-    world = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2, "--plant", "nominal", "randomised")
+    world = ("--env", "BirthSIM/Probe-v3", "--sensors", "ideal", "--episodes", 2, "--plant", "nominal", "randomised")
     arguments = (*world, "--controller", "backstepping", slam, "--jobs", 1, "--out", out)
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments)
     assert status == 0, complained
@@ -122,21 +122,21 @@ def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_pa
     """With drawn sensors, whose case is named in words of its own."""
     (tmp_path / "own.py").write_text(OWN + FAILING)
     fails = f"{tmp_path}/own.py:Fails"
-    world = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--plant", "drawn-sensors")
+    world = ("--env", "BirthSIM/Probe-v3", "--sensors", "honest", "--episodes", 2, "--plant", "drawn-sensors")
     arguments = (*world, "--jobs", 1, "--controller", fails, "backstepping")
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
     assert "| backstepping |" in printed
     assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
-    assert 'BirthSIM/Probe-v2,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()
+    assert 'BirthSIM/Probe-v3,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     assert [cell["controller"] for cell in cells_of(strict(tmp_path / "out" / "comparison.json"))] == ["backstepping"]
 
 
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     own, out = tmp_path / "own.py", tmp_path / "out"
     own.write_text(OWN)
-    arguments = ("--env", "BirthSIM/Probe-v2", "--controller", f"{own}:Slam", "--episodes", 10**5, "--jobs", 1, "--out", out)
+    arguments = ("--env", "BirthSIM/Probe-v3", "--controller", f"{own}:Slam", "--episodes", 10**5, "--jobs", 1, "--out", out)
     status, printed = interrupted("evaluate", arguments, lambda: list(out.rglob("*.json")))
     kept = list(out.rglob("*.json"))
     assert status == 130

@@ -30,7 +30,7 @@ def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_pa
     assert "Warning" not in done.stderr
     medians = []
     for name, arguments, place in (("named", ("--controller", "residual"), folder), ("unnamed", (), own)):
-        options = ("--env", "BirthSIM/Probe-v2", "--policy", place, "--episodes", 2, "--seed", 900, "--out", tmp_path / name)
+        options = ("--env", "BirthSIM/Probe-v3", "--policy", place, "--episodes", 2, "--seed", 900, "--out", tmp_path / name)
         status, printed, _ = call("evaluate", monkeypatch, capsys, *arguments, *options)
         assert status == 0
         assert "residual: median" in (tmp_path / name / "evaluation.md").read_text()
@@ -84,7 +84,7 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
     assert status == 0, complained
     alone, together = ((tmp_path / place / "seed_6" / WEIGHTS).read_bytes() for place in ("alone", "out"))
     assert alone == together
-    evaluate = ("--env", "BirthSIM/Probe-v2", "--policy", tmp_path / "out", "--episodes", 1, "--out", tmp_path / "evaluated")
+    evaluate = ("--env", "BirthSIM/Probe-v3", "--policy", tmp_path / "out", "--episodes", 1, "--out", tmp_path / "evaluated")
     status, printed, complained = call("evaluate", monkeypatch, capsys, *evaluate)
     assert status == 0, complained
     assert "residual, 2 seeds " in printed

@@ -32,7 +32,7 @@ CASES += NO_PLACE
 
 def world(sensors="ideal", lanes=1, rig=RIG, seed=5):
     """Lanes of one world."""
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, policy_period=0.001, parameters=rig)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=lanes, sensors=sensors, policy_period=0.001, parameters=rig)
     env.reset(seed=[seed] * lanes)
     return env
 

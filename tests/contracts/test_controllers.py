@@ -44,7 +44,7 @@ def told(law, lanes, rng):
 def recorded(law, sensors, rig, lanes, ticks):
     """What a law is handed in closed loop with randomised rigs, told from half-time on, and what it commands."""
     env = gymnasium.make_vec(
-        "BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
+        "BirthSIM/Circle-v2", num_envs=lanes, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
     )
     env.reset(seed=40)
     rng, signals, commands = np.random.default_rng(0), [], []

@@ -24,7 +24,7 @@ COPIES = {"copy": copy.deepcopy, "pickle": lambda law: pickle.loads(pickle.dumps
 @pytest.mark.parametrize("name", NAMES)
 def test_a_copy_goes_on_as_the_original_does(name):
     """Sampled positions, so that observers and policies remember. One lane of both begins anew later on."""
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors="lab", randomize=True, policy_period=0.001)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, sensors="lab", randomize=True, policy_period=0.001)
     env.reset(seed=3)
     law, copies = make_controller(name, RIG), {}
     for tick in range(75):

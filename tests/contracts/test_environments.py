@@ -15,6 +15,7 @@ from stable_baselines3.common.env_checker import check_env as stable_baselines_c
 
 import birthsim_env
 from agents.residual.settings import IMPEDANCES, LAWS
+from birthsim_env.ids import environment_ids
 from birthsim_env.info import FIELDS
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
@@ -22,7 +23,7 @@ from birthsim_env.registry import names
 from birthsim_env.reward import REWARD_TERMS
 from tests.physics.plant.test_options import EACH, WORTH
 
-CIRCLE, RESIDUAL, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1", "BirthSIM/Forceps-v1"
+CIRCLE, RESIDUAL, FORCEPS = "BirthSIM/Circle-v2", "BirthSIM/CircleResidual-v2", "BirthSIM/Forceps-v2"
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
 WORLDS = {
     **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True})
@@ -30,12 +31,12 @@ WORLDS = {
     **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in names("hand")},
     **{f"law {law} {sensors}": (RESIDUAL, {"law": law, "sensors": sensors, "randomize": True})
        for law, sensors in itertools.product(LAWS, names("sensors"))},
-    **{f"impedance {mode}": ("BirthSIM/DystociaResidual-v1", {"impedance": mode}) for mode in IMPEDANCES},
+    **{f"impedance {mode}": ("BirthSIM/DystociaResidual-v2", {"impedance": mode}) for mode in IMPEDANCES},
     **{f"option {name}": (CIRCLE, {"parameters": Parameters().replace(changes)}) for name, changes in EACH.items()},
     "flows": (FORCEPS, {"action_mode": "flow", "valves": "one_valve"}),
     "one valve": (FORCEPS, {"valves": "one_valve"}),
-    "as described": ("BirthSIM/Descent-v1", {"action_mode": "flow", "policy_period": 0.02}),
-    "drawn mass": ("BirthSIM/Descent-v1", {"randomize": {"mechanics.mass": (2, 5)}}),
+    "as described": ("BirthSIM/Descent-v2", {"action_mode": "flow", "policy_period": 0.02}),
+    "drawn mass": ("BirthSIM/Descent-v2", {"randomize": {"mechanics.mass": (2, 5)}}),
     "drawn options": (CIRCLE, {"randomize": {name: pair for name, pair in WORTH.items() if "electronics" not in name}}),
     **{f"acceleration {sensors}": (CIRCLE, {"sensors": sensors, "parameters": FELT}) for sensors in ("lab", "honest")},
 }  # fmt: skip
@@ -70,7 +71,7 @@ def assert_lane(infos, lane, info, where=""):
             np.testing.assert_array_equal(infos[name][lane], np.asarray(info[name]), err_msg=f"{where} {name}", strict=True)
 
 
-IDS = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/"))
+IDS = environment_ids()
 FACES = [
     dict(zip(("action_mode", "valves", "sensors"), face, strict=True))
     for face in itertools.product(("valve", "flow"), ("two_valves", "one_valve"), names("sensors"))

@@ -16,7 +16,7 @@ from birthsim_env import Parameters, registry
 
 KINDS = ("scenario", "sensors")
 PLUGINS = Path(__file__).parent / "plugins"
-PROBE = "BirthSIM/Probe-v2"
+PROBE = "BirthSIM/Probe-v3"
 RIG = Parameters()
 
 
@@ -41,7 +41,7 @@ def evaluated(controller, environment=PROBE, episodes=3, **arguments):
 
 def test_a_controller_in_python_and_compiled_is_the_same_to_the_bit_and_follows():
     names = (f"{PLUGINS}/controller.py:Plain", f"{PLUGINS}/controller.py:Compiled", "shut-valves")
-    plain, compiled, shut = (evaluated(name, "BirthSIM/Circle-v1", duration=2.0) for name in names)
+    plain, compiled, shut = (evaluated(name, "BirthSIM/Circle-v2", duration=2.0) for name in names)
     np.testing.assert_array_equal(plain.traces[0], compiled.traces[0])
     assert max(plain.metrics["error_rms_x"]) < 0.2 * min(shut.metrics["error_rms_x"])
     assert not list(PLUGINS.glob("*.nbc")), "machine code is kept in its own folder, not beside a user's file"
@@ -49,7 +49,7 @@ def test_a_controller_in_python_and_compiled_is_the_same_to_the_bit_and_follows(
 
 def test_a_controller_drives_an_environment():
     law = make_controller(f"{PLUGINS}/controller.py:Compiled", RIG)
-    env = gymnasium.make("BirthSIM/Circle-v1", actuation=driving(law, None), policy_period=0.001).unwrapped
+    env = gymnasium.make("BirthSIM/Circle-v2", actuation=driving(law, None), policy_period=0.001).unwrapped
     env.reset(seed=0)
     for _ in range(200):
         wanted, seen = env.reference.position, env.measurement.position
@@ -62,7 +62,7 @@ def test_a_controller_drives_an_environment():
 def test_a_sensor_model_shows_the_steps_of_its_own():
     import sensor  # noqa: F401  # registers it
 
-    env = gymnasium.make("BirthSIM/Circle-v1", sensors="coarse").unwrapped
+    env = gymnasium.make("BirthSIM/Circle-v2", sensors="coarse").unwrapped
     env.reset(seed=0)
     for _ in range(20):
         env.step(np.zeros(4, np.float32))

@@ -28,7 +28,7 @@ from birthsim_env.registry import names
 from birthsim_env.vector_env import BirthSIMVectorEnv
 from tests.registered import registered
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 
 
 def shut(measurement, reference):

@@ -19,7 +19,7 @@ from birthsim_env.physics.rig.values import length_of
 from birthsim_env.vector_env import BirthSIMVectorEnv
 from tests.fuzz.watched import watched
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 RIG = Parameters()
 
 

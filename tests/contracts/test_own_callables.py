@@ -86,7 +86,7 @@ def own(tmp_path_factory):
 
 
 def run(law):
-    return evaluate("BirthSIM/Probe-v2", law, "own", episodes=2, seed=0, progress=False, duration=0.01).lost
+    return evaluate("BirthSIM/Probe-v3", law, "own", episodes=2, seed=0, progress=False, duration=0.01).lost
 
 
 @pytest.mark.parametrize("name", TAKEN)
@@ -138,7 +138,7 @@ HANDS = {
 @pytest.mark.parametrize("name", HANDS)
 def test_a_hand_is_any_function_of_one_or_three_arguments(name):
     function, felt = HANDS[name]
-    env = gymnasium.make("BirthSIM/Probe-v2", user_force=function).unwrapped
+    env = gymnasium.make("BirthSIM/Probe-v3", user_force=function).unwrapped
     env.reset(seed=0)
     info = env.step(np.zeros(4))[4]
     assert env.simulation.user_force.closed_loop is felt
@@ -148,7 +148,7 @@ def test_a_hand_is_any_function_of_one_or_three_arguments(name):
 @pytest.mark.parametrize("hand", [lambda: (0.0, 0.0), lambda t, x: (0.0, 0.0), lambda t, *, gain: (0.0, 0.0)])
 def test_a_hand_of_other_arguments_is_refused(hand):
     with pytest.raises(ValueError, match=r"user_force: a function of . arguments.*; allowed: a function of time"):
-        gymnasium.make("BirthSIM/Probe-v2", user_force=hand)
+        gymnasium.make("BirthSIM/Probe-v3", user_force=hand)
 
 
 def test_what_does_not_say_what_it_takes_takes_anything():

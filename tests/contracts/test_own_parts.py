@@ -37,13 +37,13 @@ def test_an_answer_that_is_none_is_refused_by_name(argument, answer, words):
     base, method, name = PARTS[argument]
     wrong = type("Wrong", (base,), {method: lambda self, *asked: answer})()
     with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make("BirthSIM/Probe-v2", **{argument: wrong}).reset(seed=0)
+        gymnasium.make("BirthSIM/Probe-v3", **{argument: wrong}).reset(seed=0)
     assert all(word in str(refusal.value) for word in (name, *words)), refusal.value
     assert "\n" not in str(refusal.value)
 
 
 def test_a_part_without_its_method_says_what_is_missing():
     with pytest.raises(NotImplementedError, match=r"Trajectory.sample\(time\) is missing; .*\(8, N\)"):
-        gymnasium.make("BirthSIM/Probe-v2", reference=Trajectory()).reset(seed=0)
+        gymnasium.make("BirthSIM/Probe-v3", reference=Trajectory()).reset(seed=0)
     with pytest.raises(NotImplementedError, match=r"UserForce.force\(time, position, velocity\) is missing"):
-        gymnasium.make("BirthSIM/Probe-v2", user_force=UserForce()).reset(seed=0)
+        gymnasium.make("BirthSIM/Probe-v3", user_force=UserForce()).reset(seed=0)

@@ -31,7 +31,7 @@ def test_it_is_listed_evaluated_and_asked_about(monkeypatch, capsys):
     assert "proportional" in compiled_names()
     assert "proportional-python" not in compiled_names()
     laws = [make_controller(name, RIG) for name in ("proportional", "proportional-python")]
-    traces = [evaluate("BirthSIM/Probe-v2", law, "", 1, 0, progress=False, duration=0.1).traces[0] for law in laws]
+    traces = [evaluate("BirthSIM/Probe-v3", law, "", 1, 0, progress=False, duration=0.1).traces[0] for law in laws]
     np.testing.assert_array_equal(*traces)
     with pytest.raises(ValueError, match=r"did you mean 'proportional'"):
         make_controller("proportionel", RIG)

@@ -26,7 +26,7 @@ from birthsim_env.physics.rig.parameters import DECLARED
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
-CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
+CIRCLE, PROBE = "BirthSIM/Circle-v2", "BirthSIM/Probe-v3"
 NAN, INF = math.nan, math.inf
 RIG = Parameters()
 
@@ -39,8 +39,8 @@ environment = partial(gymnasium.make, CIRCLE)
 lanes = partial(gymnasium.make_vec, CIRCLE, num_envs=2)
 itself, lanes_themselves = partial(BirthSIMEnv, "circle"), partial(BirthSIMVectorEnv, "circle")
 """Without ``gymnasium.make``, which warns of a render mode first."""
-residual_environment = partial(gymnasium.make, "BirthSIM/CircleResidual-v1")
-residual_lanes = partial(gymnasium.make_vec, "BirthSIM/CircleResidual-v1", num_envs=2)
+residual_environment = partial(gymnasium.make, "BirthSIM/CircleResidual-v2")
+residual_lanes = partial(gymnasium.make_vec, "BirthSIM/CircleResidual-v2", num_envs=2)
 gains = partial(make_controller, "admittance[learn=false]", RIG)
 evaluation = partial(evaluate, PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False)
 linear = partial(linearize, None, (0.5, 0.0))
@@ -160,7 +160,7 @@ TABLE = [
     (training, "target", ("wall",), "'spring', 'impedance'"),
     (partial(training, algorithm="ppo"), "target", ("impedance",), "'spring'"),
     (training, "beside", (3,), "ids of residual environments"),
-    (partial(training, algorithm="sac"), "beside", (("BirthSIM/ProbeResidual-v2",),), "()"),
+    (partial(training, algorithm="sac"), "beside", (("BirthSIM/ProbeResidual-v3",),), "()"),
     (partial(training, algorithm="apg", beside=("a", "b")), "lanes", (32,), "a multiple of 3"),
     (training, "margin", (-0.1,), ">= 0 and <= 1"),
     (training, "sensors", ("none",), "'ideal', 'lab'"),

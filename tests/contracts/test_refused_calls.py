@@ -25,7 +25,7 @@ from birthsim_env.physics.compiled.records import Rows, row, rows
 from lab.studies.lyapunov import LyapunovFunction
 from tests.oracles.strict_feedback import strict_feedback_rates
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 NAN, INF = float("nan"), float("inf")
 RIG = Parameters()
 STREAMS = Streams(np.ones(2, dtype=np.uint64), np.zeros(2, dtype=np.int64), "reference")
@@ -101,8 +101,8 @@ TABLE = {
     ("force_first = True", "False with valves = 'one_valve'"): [paper(valves="one_valve", force_first=True)],
     ("law.frozen_friction = True", "False"): [lambda: LyapunovFunction(BacksteppingController(frozen_friction=True))],
     ("'smoothing'", "law, impedance, "): [
-        lambda: gymnasium.make("BirthSIM/CircleResidual-v1", smoothing=0.3),
-        lambda: gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=3, smoothing=0.3),
+        lambda: gymnasium.make("BirthSIM/CircleResidual-v2", smoothing=0.3),
+        lambda: gymnasium.make_vec("BirthSIM/CircleResidual-v2", num_envs=3, smoothing=0.3),
     ],
     ("'sensor'", "action_mode, valves, sensors, randomize"): [env(sensor="lab")],
     ("state has shape (7, 2)", "(8, 2)"): [rates(7, 4)],

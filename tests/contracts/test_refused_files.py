@@ -15,7 +15,7 @@ from birthsim_live.logs.reading import read_log
 from lab.studies.sweeps.plan import load_sweep
 from lab.studies.sweeps.work import tasks_of
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 RIG = Parameters()
 
 

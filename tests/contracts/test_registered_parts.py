@@ -13,7 +13,7 @@ from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.registry import entries, entry
 from tests.registered import registered
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0})
 TUBED = Parameters().replace({"chambers.tube_length": 1.0, "chambers.pressure_cells": "valve"})
 

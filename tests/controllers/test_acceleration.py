@@ -37,7 +37,7 @@ def test_exact_speeds_are_not_replaced():
 
 @pytest.mark.parametrize("name", ["admittance-adaptive", "limited:admittance-adaptive"])
 def test_a_law_that_needs_an_acceleration_says_so(name):
-    env = gymnasium.make("BirthSIM/Circle-v1", sensors="honest", policy_period=0.001).unwrapped
+    env = gymnasium.make("BirthSIM/Circle-v2", sensors="honest", policy_period=0.001).unwrapped
     env.reset(seed=0)
     wanted = r"measurement\.acceleration = None; allowed: \(2, 1\) m/s2, since .* electronics\.acceleration_bandwidth = 300\.0"
     with pytest.raises(ValueError, match=wanted):

@@ -22,7 +22,7 @@ def openings(name, sensors, believed=RIG, rig=RIG, shown=lambda seen: {}, **gain
     """Openings (120, 4, 3) of a law on the circle; ``shown(seen)`` is what it is shown instead."""
     law = make_controller(name, believed, **gains)
     env = gymnasium.make_vec(
-        "BirthSIM/Circle-v1", num_envs=3, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
+        "BirthSIM/Circle-v2", num_envs=3, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
     )
     env.reset(seed=[40, 41, 42])
     told = []
@@ -43,7 +43,7 @@ def test_with_exact_sensors_and_no_rate_it_is_the_law_that_does_not_learn():
 def test_friction_that_is_not_as_believed_is_learned_on_a_circle(factor):
     true = closed_loop.slippery(factor)
     law = make_controller("admittance-adaptive", RIG)
-    result = evaluate("BirthSIM/Circle-v1", law, "adaptive", 1, 0, progress=False, parameters=true)
+    result = evaluate("BirthSIM/Circle-v2", law, "adaptive", 1, 0, progress=False, parameters=true)
     levels = Memory(law._memories[0]).friction.level[:, 0]
     assert not result.lost[0]
     np.testing.assert_allclose(levels, factor, rtol=0.2)
@@ -73,7 +73,7 @@ def test_sensors_as_described_are_the_same_in_all_worlds():
 def moving(rig, lanes):
     """``motion_floor`` (lanes,), mm, of the worlds of ``circle_floor``."""
     world = {"parameters": rig, "sensors": "honest", "randomize": True}
-    env = gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=lanes, **world)
+    env = gymnasium.make_vec("BirthSIM/CircleResidual-v2", num_envs=lanes, **world)
     found = motion_floor(env, rig, 0)
     env.close()
     return found
@@ -96,7 +96,7 @@ def test_on_circles_a_scale_and_a_gain_leave_their_share():
 def test_a_noisy_late_tracker_makes_no_lasting_swing(seed, most):
     """Worlds in which a gain that fell to 0.35 of itself made the head swing by 118 and 22 mm; now it is 8 and 3 mm or so."""
     law = make_controller("admittance-adaptive", Parameters())
-    found = evaluate("BirthSIM/Probe-v2", law, "adaptive", 1, seed, progress=False, sensors="honest", randomize=True).metrics
+    found = evaluate("BirthSIM/Probe-v3", law, "adaptive", 1, seed, progress=False, sensors="honest", randomize=True).metrics
     assert max(found["hunting_x"][0], found["hunting_y"][0]) < most
 
 
@@ -116,7 +116,7 @@ def test_a_head_heavier_than_five_kilograms_rests_with_less_gain(mass, rest_gain
 def test_known_friction_lets_the_head_rest_without_a_force_sensor() -> None:
     """Rows of issue 32, honest sensors, the rig known: within 4 % of the stiffness, 0.2 mm at rest, 25 l/min of air."""
     law = make_controller("admittance[force_sensor=false,identified=true]", RIG)
-    found = evaluate("BirthSIM/Probe-v2", law, "identified", 16, 91_000, progress=False, sensors="honest", randomize=False)
+    found = evaluate("BirthSIM/Probe-v3", law, "identified", 16, 91_000, progress=False, sensors="honest", randomize=False)
     figures = {name: found.summary()[name]["median"] for name in ("stiffness_error", "unrest", "air")}
     assert abs(figures["stiffness_error"]) < 4.0
     assert figures["unrest"] < 0.2

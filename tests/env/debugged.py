@@ -59,20 +59,20 @@ OPTIONS = {
     "electronics.acceleration_bandwidth": 50.0,
 }  # fmt: skip
 CASES = {
-    "circle lab backstepping": lambda: steps(3, "BirthSIM/Circle-v1", "backstepping", sensors="lab", randomize="plant"),
-    "circle honest admittance": lambda: steps(3, "BirthSIM/Circle-v1", "admittance", sensors="honest", randomize="plant"),
-    "probe honest backstepping": lambda: steps(3, "BirthSIM/Probe-v2", "backstepping", sensors="honest"),
-    "probe lab admittance": lambda: steps(3, "BirthSIM/Probe-v2", "admittance", sensors="lab"),
-    "evaluated": lambda: measured("BirthSIM/Circle-v1", "admittance", sensors="honest", randomize="plant", duration=0.05),
-    "residual": lambda: steps(2, "BirthSIM/CircleResidual-v1", sensors="honest"),
-    "options": lambda: steps(2, "BirthSIM/Forceps-v1", sensors="lab", parameters=RIG.replace(OPTIONS)),
-    "lanes, a hand in Python": lambda: steps(2, "BirthSIM/Probe-v2", lanes=3, randomize="plant", user_force=Spring()),
+    "circle lab backstepping": lambda: steps(3, "BirthSIM/Circle-v2", "backstepping", sensors="lab", randomize="plant"),
+    "circle honest admittance": lambda: steps(3, "BirthSIM/Circle-v2", "admittance", sensors="honest", randomize="plant"),
+    "probe honest backstepping": lambda: steps(3, "BirthSIM/Probe-v3", "backstepping", sensors="honest"),
+    "probe lab admittance": lambda: steps(3, "BirthSIM/Probe-v3", "admittance", sensors="lab"),
+    "evaluated": lambda: measured("BirthSIM/Circle-v2", "admittance", sensors="honest", randomize="plant", duration=0.05),
+    "residual": lambda: steps(2, "BirthSIM/CircleResidual-v2", sensors="honest"),
+    "options": lambda: steps(2, "BirthSIM/Forceps-v2", sensors="lab", parameters=RIG.replace(OPTIONS)),
+    "lanes, a hand in Python": lambda: steps(2, "BirthSIM/Probe-v3", lanes=3, randomize="plant", user_force=Spring()),
 }
 
 
 def traced(kernel):
     """File, line and a local number of every frame of a ``kernel`` that Python enters in one control period."""
-    env, met = gymnasium.make("BirthSIM/Circle-v1", policy_period=0.001).unwrapped, []
+    env, met = gymnasium.make("BirthSIM/Circle-v2", policy_period=0.001).unwrapped, []
     env.reset(seed=0)
 
     def note(frame, event, argument):

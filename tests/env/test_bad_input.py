@@ -9,7 +9,7 @@ import pytest
 
 import birthsim_env  # noqa: F401  registers the ids
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 NAN, INF = math.nan, math.inf
 
 

@@ -43,7 +43,7 @@ def test_python_enters_the_frame_of_a_stage(found):
 
 SCRIPT = """
 import gymnasium, numpy as np, birthsim_env
-env = gymnasium.make("BirthSIM/Circle-v1", policy_period=0.001).unwrapped
+env = gymnasium.make("BirthSIM/Circle-v2", policy_period=0.001).unwrapped
 env.reset(seed=0)
 env.step(np.zeros(4, np.float32))
 print(env.pipeline)

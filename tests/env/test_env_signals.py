@@ -71,7 +71,7 @@ def test_an_ideal_observation_is_info_over_the_documented_scales(name):
 
 
 def test_info_has_every_documented_field_and_agrees_with_the_plant():
-    env = make("BirthSIM/Forceps-v1", randomize=True)
+    env = make("BirthSIM/Forceps-v2", randomize=True)
     _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
     for step, info in enumerate(infos):
         assert set(info) == {*FIELDS, *REWARD_TERMS, "is_success"}

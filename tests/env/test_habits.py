@@ -14,10 +14,11 @@ from baselines import evaluate, make_controller
 from birthsim_env import Parameters
 from birthsim_env.assembly import DEFAULTS, Arguments
 from birthsim_env.env import BirthSIMEnv
+from birthsim_env.ids import environment_ids
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 single, vector = partial(gymnasium.make, CIRCLE), partial(gymnasium.make_vec, CIRCLE, num_envs=2)
 both = pytest.mark.parametrize("make", [single, vector], ids=["single", "vector"])
 
@@ -156,15 +157,15 @@ def test_info_says_what_a_step_costs():
     assert (env.reset()[1]["air_used"] == 0.0).all()
 
 
-def test_every_superseded_id_names_its_successor():
+def test_every_former_id_names_its_successor_and_says_what_changed():
     """CONTRIBUTING.md promises it of every version that was."""
-    names = [name for name in gymnasium.registry if name.startswith("BirthSIM/")]
+    names = environment_ids()
     older = [(f"{name[: -len(v)]}{k}", name) for name in names for v in [name.rpartition("-v")[2]] for k in range(int(v))]
-    assert ("BirthSIM/Probe-v1", "BirthSIM/Probe-v2") in older
+    assert {("BirthSIM/Probe-v1", "BirthSIM/Probe-v3"), ("BirthSIM/Circle-v1", "BirthSIM/Circle-v2")} <= {*older}
     for old, new in older:
         for make in (gymnasium.make, gymnasium.make_vec):
             with (
                 pytest.warns(DeprecationWarning, match=f"{old} is out of date"),
-                pytest.raises(gymnasium.error.DeprecatedEnv, match=f"use `{new}`"),
+                pytest.raises(gymnasium.error.DeprecatedEnv, match=f"{old} .*valves and seals.*`{new}`"),
             ):
                 make(old)

@@ -16,7 +16,7 @@ from tests.env.test_loop import OwnValves, assert_same, course, own
 from tests.parts.test_honest_sensors import OFF
 from tests.registered import registered
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 
 
 class AskedForAll(HonestSensors):

@@ -18,7 +18,7 @@ from birthsim_env.parts.sensors.ideal import IdealSensors
 from birthsim_env.registry import names
 from tests.registered import registered
 
-CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
+CIRCLE, RESIDUAL = "BirthSIM/Circle-v2", "BirthSIM/CircleResidual-v2"
 
 
 def course(env, steps=25, seed=3):

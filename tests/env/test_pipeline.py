@@ -17,7 +17,7 @@ from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.physics.compiled.compilation import kernel
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 STILL = np.zeros(4, np.float32)
 
 

@@ -32,7 +32,7 @@ def _env(case):
     if case in WORLDS:
         return made(case, 2)
     law = driving(make_controller(case, RIG), case)
-    return gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=1e-3, sensors="honest", actuation=law)
+    return gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, policy_period=1e-3, sensors="honest", actuation=law)
 
 
 def _words(plain):
@@ -151,7 +151,7 @@ def test_more_knots_than_there_are_and_none_are_refused_by_name():
 
 
 def test_a_refused_state_does_not_begin_an_environment():
-    env, other = (gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2) for _ in range(2))
+    env, other = (gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2) for _ in range(2))
     other.reset(seed=5)
     with pytest.raises(ValueError, match="is missing"):
         env.set_state({name: value for name, value in other.get_state().items() if name != "ended"})
@@ -177,7 +177,7 @@ class Hand(birthsim_env.UserForce):
 
 @pytest.mark.parametrize("kind", [np.random.PCG64, np.random.MT19937, np.random.Philox, np.random.SFC64])
 def test_any_generator_of_numpy_goes_on(kind):
-    one, other = (gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force=Hand(kind)) for _ in range(2))
+    one, other = (gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, user_force=Hand(kind)) for _ in range(2))
     one.reset(seed=0), one.step(np.zeros((2, 4)))
     other.set_state(one.get_state())
     np.testing.assert_array_equal(one.step(np.zeros((2, 4)))[0], other.step(np.zeros((2, 4)))[0])

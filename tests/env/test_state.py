@@ -15,7 +15,7 @@ LANES = 3
 
 
 def test_lanes_that_have_ended_and_the_seeds_to_come_are_part_of_it():
-    env, other = (gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, duration=0.05, randomize=True) for _ in range(2))
+    env, other = (gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, duration=0.05, randomize=True) for _ in range(2))
     env.reset()  # seeds of its own
     for _ in range(5):
         _, _, _, truncated, _ = env.step(np.zeros((2, 4), np.float32))
@@ -28,7 +28,7 @@ def test_lanes_that_have_ended_and_the_seeds_to_come_are_part_of_it():
 
 @pytest.mark.parametrize("arguments", [{"sensors": "lab", "randomize": True}, {"user_force": "guided"}])
 def test_the_single_environment_has_it_too(arguments):
-    one, other = (gymnasium.make("BirthSIM/CircleResidual-v1", duration=0.4, **arguments).unwrapped for _ in range(2))
+    one, other = (gymnasium.make("BirthSIM/CircleResidual-v2", duration=0.4, **arguments).unwrapped for _ in range(2))
     given = np.random.default_rng(0).uniform(-1, 1, (35, *one.action_space.shape))
     one.reset(seed=1)
     for action in given[:15]:
@@ -59,7 +59,7 @@ class Counting(birthsim_env.UserForce):
 
 
 def test_a_users_own_part_keeps_its_memory():
-    one, other = (gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, duration=0.4, user_force=Counting()) for _ in range(2))
+    one, other = (gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, duration=0.4, user_force=Counting()) for _ in range(2))
     one.reset(seed=1)
     for _ in range(7):
         one.step(np.zeros((2, 4)))
@@ -71,7 +71,7 @@ def test_a_users_own_part_keeps_its_memory():
 
 def test_a_part_that_keeps_what_no_array_can_is_named():
     hand = Counting()
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force=hand)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, user_force=hand)
     env.reset(seed=1)
     hand.lock = threading.Lock()
     with pytest.raises(ValueError, match=r"user_force\.lock is a lock; allowed in a state: numbers, text, None, arrays"):
@@ -79,7 +79,7 @@ def test_a_part_that_keeps_what_no_array_can_is_named():
 
 
 def test_without_episodes_there_is_no_state():
-    for env in (gymnasium.make("BirthSIM/Circle-v1").unwrapped, gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2)):
+    for env in (gymnasium.make("BirthSIM/Circle-v2").unwrapped, gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2)):
         with pytest.raises(RuntimeError, match=r"get_state\(\) before reset\(\): call reset\(seed=\.\.\.\) first"):
             env.get_state()
 

@@ -11,7 +11,7 @@ from birthsim_env.info import FIELDS
 from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
-CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
+CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v2", "BirthSIM/Probe-v3", "BirthSIM/Forceps-v2"
 
 
 def make(name=CIRCLE, lanes=3, **arguments):

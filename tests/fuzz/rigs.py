@@ -10,7 +10,7 @@ def run_a_little(rig, steps=STEPS, **arguments):
     """Some steps under random openings: while an episode goes on, nothing is anything but finite."""
     period = rig.electronics.control_period
     arguments = {"policy_period": period * max(1, round(0.01 / period)), **arguments}
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, parameters=rig, **arguments)
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=2, parameters=rig, **arguments)
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(steps):

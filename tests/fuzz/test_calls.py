@@ -23,7 +23,7 @@ from tests.fuzz.strategies import composite, near, sampled, strange
 from tests.fuzz.watched import cases, watched
 
 STEPS, CALLING = 4, 2**30
-CIRCLE, RIG = "BirthSIM/Circle-v1", Parameters()
+CIRCLE, RIG = "BirthSIM/Circle-v2", Parameters()
 
 GOOD = {
     "action_mode": ("valve", "flow"),

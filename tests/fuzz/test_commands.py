@@ -27,7 +27,7 @@ from tests.fuzz.watched import cases, watched
 ODD = (
     *("0", "-1", "1", "2", "1000000000", "9" * 320, "9" * 5000, "1e308", "nan", "inf", "-inf", "1.5", "0x10", "1_000", "", " "),
     *("x", "²", "٣", "१", "\udcff", "[[", "a=b", "=", "a=", "=b", "pid[", "pid[a=]", "pid[bandwidth=1e999]", "/dev/zero"),
-    *("/", "..", "x\ny", "pid", "circle", "both", "lab", "BirthSIM/Circle-v1", "CartPole-v1", "BirthSIM/", "none", "true"),
+    *("/", "..", "x\ny", "pid", "circle", "both", "lab", "BirthSIM/Circle-v2", "CartPole-v1", "BirthSIM/", "none", "true"),
     *("bandwidth=60", "--", "-x"),
 )
 WORDS = sampled(ODD) | st.text(st.characters(exclude_characters="\x00"), max_size=10)
@@ -86,10 +86,10 @@ def test_a_command_line(name, data):
 
 
 RUNS = {
-    "evaluate": ("--env", "BirthSIM/Probe-v2", "--controller", "admittance-backstepping", "--episodes", "2"),
+    "evaluate": ("--env", "BirthSIM/Probe-v3", "--controller", "admittance-backstepping", "--episodes", "2"),
     "train": ("--config", "probe", "--steps", "4096"),
     "tune": ("--controller", "pid", "--trials", "1", "--lanes", "2"),
-    "animate": ("--env", "BirthSIM/Probe-v2", "--end", "1.6", "--rate", "10"),
+    "animate": ("--env", "BirthSIM/Probe-v3", "--end", "1.6", "--rate", "10"),
 }
 
 

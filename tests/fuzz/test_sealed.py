@@ -23,7 +23,7 @@ from tests.fuzz.strategies import altered, composite, damaged, json_texts, odd_a
 from tests.fuzz.watched import cases, watched
 
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"law": {"pooled_mm": 2.5}, "policy": None, "curve": [{"steps": 0, "x": 0.1}]}
-TINY = TrainingSettings("BirthSIM/ProbeResidual-v2", steps=64, lanes=2, rollout=16, batch=32, hidden=(8, 8))
+TINY = TrainingSettings("BirthSIM/ProbeResidual-v3", steps=64, lanes=2, rollout=16, batch=32, hidden=(8, 8))
 
 
 @composite

@@ -16,10 +16,10 @@ from tests.fuzz.watched import cases, watched
 assert agents  # registers the environments with a law inside
 
 WORLDS = {
-    "honest": {"id": "BirthSIM/Circle-v1", "sensors": "honest", "randomize": True},
-    "lab": {"id": "BirthSIM/Descent-v1", "sensors": "lab", "randomize": True},
-    "guided": {"id": "BirthSIM/Circle-v1", "user_force": "guided"},
-    "residual": {"id": "BirthSIM/CircleResidual-v1", "law": "admittance", "sensors": "lab"},
+    "honest": {"id": "BirthSIM/Circle-v2", "sensors": "honest", "randomize": True},
+    "lab": {"id": "BirthSIM/Descent-v2", "sensors": "lab", "randomize": True},
+    "guided": {"id": "BirthSIM/Circle-v2", "user_force": "guided"},
+    "residual": {"id": "BirthSIM/CircleResidual-v2", "law": "admittance", "sensors": "lab"},
 }
 STEPS = 3
 

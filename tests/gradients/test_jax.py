@@ -14,7 +14,7 @@ from agents.gradients.jax_rollouts import Worlds  # noqa: E402
 
 
 def lanes() -> Any:
-    return gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, duration=0.04, autoreset_mode="SameStep")
+    return gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=3, duration=0.04, autoreset_mode="SameStep")
 
 
 def test_gradients_are_those_of_torch_also_compiled() -> None:

@@ -17,17 +17,17 @@ from lab.studies.gradients.checks import CONTROLLERS
 from lab.studies.gradients.loops import SMOOTH, begun, compared
 
 SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
-    "valves": {"world": "BirthSIM/Circle-v1"},
-    "one valve, flows": {"world": "BirthSIM/Forceps-v1", "action_mode": "flow", "valves": "one_valve"},
-    "no law": {"world": "BirthSIM/VacuumResidual-v0", "law": "none"},
+    "valves": {"world": "BirthSIM/Circle-v2"},
+    "one valve, flows": {"world": "BirthSIM/Forceps-v2", "action_mode": "flow", "valves": "one_valve"},
+    "no law": {"world": "BirthSIM/VacuumResidual-v1", "law": "none"},
     "residual of 5": {
-        "world": "BirthSIM/DystociaResidual-v1", "law": "backstepping-force-first", "impedance": "variable",
+        "world": "BirthSIM/DystociaResidual-v2", "law": "backstepping-force-first", "impedance": "variable",
         "sensors": "honest",
     },
-    "informed": {"world": "BirthSIM/CircleResidual-v1", "law": "none", "informed": True, "sensors": "honest"},
-    "a hand that feels": {"world": "BirthSIM/Probe-v2", "user_force": "guided"},
+    "informed": {"world": "BirthSIM/CircleResidual-v2", "law": "none", "informed": True, "sensors": "honest"},
+    "a hand that feels": {"world": "BirthSIM/Probe-v3", "user_force": "guided"},
     "an accelerometer": {
-        "world": "BirthSIM/Circle-v1", "controller": "admittance", "sensors": "honest",
+        "world": "BirthSIM/Circle-v2", "controller": "admittance", "sensors": "honest",
         "parameters": SMOOTH.replace({"electronics.acceleration_bandwidth": 300.0}),
     },
 }  # fmt: skip
@@ -38,7 +38,7 @@ REPEATED = {
 """Laws each stage of which another loop has, with other constants. ``birthsim study gradients-checks`` has all controllers."""
 LAWS = [name for name in CONTROLLERS if name not in REPEATED]
 LAW_LOOPS = {
-    f"{name}, {sensors}": {"world": "BirthSIM/Circle-v1", "controller": name, "sensors": sensors}
+    f"{name}, {sensors}": {"world": "BirthSIM/Circle-v2", "controller": name, "sensors": sensors}
     for name, sensors in zip(LAWS, itertools.cycle(names("sensors")), strict=False)
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
@@ -57,7 +57,7 @@ def test_gradients_are_differences(name: str) -> None:
 
 
 def lanes_of(lanes: int, **arguments: Any) -> Any:
-    env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, randomize=True, **arguments).unwrapped
+    env: Any = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=lanes, randomize=True, **arguments).unwrapped
     env.reset(seed=5)
     return env
 

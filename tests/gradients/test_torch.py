@@ -15,7 +15,7 @@ from tests.console import ROOT  # noqa: E402
 
 
 def worlds_of(lanes: int, **arguments: Any) -> Worlds:
-    return Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, autoreset_mode="SameStep", **arguments))
+    return Worlds(gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=lanes, autoreset_mode="SameStep", **arguments))
 
 
 def test_a_loss_of_ones_own_goes_back_through_the_loop() -> None:

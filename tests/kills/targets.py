@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 SWEEP = """
 [base]
-environment = "BirthSIM/Probe-v2"
+environment = "BirthSIM/Probe-v3"
 randomize = "scenario"
 episodes = 2
 seed = {seed}
@@ -17,7 +17,7 @@ y = "rig.mechanics.mass"
 """
 SEARCH = """
 [base]
-environment = "BirthSIM/Probe-v2"
+environment = "BirthSIM/Probe-v3"
 controller = "pid"
 randomize = "scenario"
 episodes = 2
@@ -49,10 +49,10 @@ class Target:
 
 TARGETS = {
     "evaluate": Target(
-        "evaluate --env BirthSIM/Probe-v2 --controller backstepping pid --episodes 2", "--seed 7", alone=True
+        "evaluate --env BirthSIM/Probe-v3 --controller backstepping pid --episodes 2", "--seed 7", alone=True
     ),
     "comparison": Target(
-        "comparison --env BirthSIM/Probe-v2 --sensors ideal --plant nominal randomised --controller backstepping pid "
+        "comparison --env BirthSIM/Probe-v3 --sensors ideal --plant nominal randomised --controller backstepping pid "
         "--episodes 2",
         "--seed 7", alone=True,
     ),
@@ -67,7 +67,7 @@ TARGETS = {
     "parquet": Target(f"export --to parquet {LOG}", file="log.parquet"),
     "mcap": Target(f"export --to mcap {LOG}", file="log.mcap"),
     "minari": Target(
-        "export --to minari --env BirthSIM/Probe-v2 --level random --episodes 12", once=True, needs=("minari", "h5py")
+        "export --to minari --env BirthSIM/Probe-v3 --level random --episodes 12", once=True, needs=("minari", "h5py")
     ),
     "explain": Target("explain --no-pushes", "--policy descent"),
     "run": Target("run", "--seed 7"),

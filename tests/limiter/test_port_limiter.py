@@ -114,7 +114,7 @@ def test_a_compiled_loop_and_calls_once_a_period_give_the_same_bits(law):
         limiter = PortLimiter(make_controller(law, RIG), RIG)
         drives = Driving(limiter, law, {}) if called else driving(limiter, law)
         assert type(drives) is (Driving if called else CompiledDriving)
-        env = gymnasium.make_vec("BirthSIM/Forceps-v1", num_envs=3, sensors="lab", policy_period=T, actuation=drives)
+        env = gymnasium.make_vec("BirthSIM/Forceps-v2", num_envs=3, sensors="lab", policy_period=T, actuation=drives)
         env.reset(seed=1)
         for _ in range(4000):
             env.unwrapped.simulation.step(env.unwrapped.simulation.action)

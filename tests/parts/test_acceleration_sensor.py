@@ -52,8 +52,8 @@ class InTheLoop(Untold):
 @pytest.mark.parametrize("model", [Untold, InTheLoop])
 def test_own_sensors_that_tell_none_are_refused_where_the_rig_has_one(model, monkeypatch):
     registered(monkeypatch, model, sensors="own")
-    gymnasium.make("BirthSIM/Circle-v1", sensors="own").reset(seed=0)
-    env = gymnasium.make("BirthSIM/Circle-v1", sensors="own", parameters="examples/acceleration_sensor_rig.toml")
+    gymnasium.make("BirthSIM/Circle-v2", sensors="own").reset(seed=0)
+    env = gymnasium.make("BirthSIM/Circle-v2", sensors="own", parameters="examples/acceleration_sensor_rig.toml")
     with pytest.raises(ValueError, match=rf"sensors {model.__name__} tell no acceleration; allowed: \(2, 1\) m/s2, since"):
         env.reset(seed=0)
 
@@ -82,7 +82,7 @@ def test_bias_and_gain_belong_to_the_episode_and_are_uniform_up_to_their_figures
 @pytest.mark.parametrize("sensors", ["lab", "honest"])
 def test_the_closed_loop_shows_what_the_model_tells(sensors):
     rig = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.acceleration_noise": 0.0})
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors=sensors, policy_period=1e-3, parameters=rig)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=2, sensors=sensors, policy_period=1e-3, parameters=rig)
     env.reset(seed=[3, 4])
     speed, seen = [], []
     for _ in range(60):

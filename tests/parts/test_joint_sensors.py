@@ -14,7 +14,7 @@ from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
 from birthsim_env.physics.geometry import inverse_geometry, joint_force
 from birthsim_env.registry import entry
 
-CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
+CIRCLE, PROBE = "BirthSIM/Circle-v2", "BirthSIM/Probe-v3"
 NONE = {f"electronics.{name}": 0.0 for name in (*SENSOR_PARAMETERS, *ENCODER_PARAMETERS, *GAUGE_PARAMETERS)}
 EXACT = {**NONE, "electronics.distortion_length": 0.6}
 """No error at all."""

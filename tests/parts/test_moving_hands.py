@@ -10,7 +10,7 @@ from birthsim_env.parts.hands.noise import Noise
 from birthsim_env.parts.hands.sine import Sine
 from birthsim_env.registry import names
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 
 
 def began(hand, lanes=1, seed=0):

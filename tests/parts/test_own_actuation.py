@@ -8,7 +8,7 @@ from birthsim_env.info import FIELDS
 from birthsim_env.observation import SIZE
 from birthsim_env.parts.actuation import Actuation
 
-PROBE = "BirthSIM/Probe-v2"
+PROBE = "BirthSIM/Probe-v3"
 
 
 class Leaky(Actuation):

@@ -11,7 +11,7 @@ from birthsim.command_line.worlds import with_options
 from birthsim_env import Circle, UserForce
 from birthsim_env.parts.own_parts import Through, trajectory_of
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 
 
 def round_about(t):
@@ -130,7 +130,7 @@ def wave(time, position, velocity):
 
 def test_an_open_force_is_asked_once_per_policy_step_with_its_control_instants():
     spy = Spy(wave)
-    env = gymnasium.make("BirthSIM/Probe-v2", user_force=spy).unwrapped
+    env = gymnasium.make("BirthSIM/Probe-v3", user_force=spy).unwrapped
     _, first = env.reset(seed=0)
     infos = [first] + [env.step(np.zeros(4))[4] for _ in range(5)]
     assert len(spy.asked) == 6
@@ -140,7 +140,7 @@ def test_an_open_force_is_asked_once_per_policy_step_with_its_control_instants()
         np.testing.assert_array_equal(velocity[:, 0], infos[step]["velocity"])
         np.testing.assert_allclose(infos[step]["user_force"], wave(time, None, None)[0, :, 0])
     # Every sample was held for its own control period: the plant alone, given the same samples, ends in the same state.
-    again = gymnasium.make("BirthSIM/Probe-v2", user_force=Spy(wave), policy_period=0.001).unwrapped
+    again = gymnasium.make("BirthSIM/Probe-v3", user_force=Spy(wave), policy_period=0.001).unwrapped
     again.reset(seed=0)
     for _ in range(50):
         again.step(np.zeros(4))
@@ -156,7 +156,7 @@ def test_a_closed_loop_force_is_asked_every_control_period_with_the_present_moti
         return np.stack([push, np.zeros_like(push)])[None]
 
     spy = Spy(spring, closed_loop=True)
-    env = gymnasium.make("BirthSIM/Probe-v2", user_force=spy, sensors=sensors).unwrapped
+    env = gymnasium.make("BirthSIM/Probe-v3", user_force=spy, sensors=sensors).unwrapped
     env.reset(seed=0)
     motions = []
     for _ in range(30):
@@ -180,7 +180,7 @@ def test_a_force_may_answer_with_one_array_that_it_fills_anew():
 
     jumps = []
     for answer in (law, lambda *arguments: law(*arguments).copy()):
-        env = gymnasium.make("BirthSIM/Probe-v2", user_force=Spy(answer))
+        env = gymnasium.make("BirthSIM/Probe-v3", user_force=Spy(answer))
         env.reset(seed=0)
         jumps.append([env.step(np.zeros(4))[4]["since_jump"] for _ in range(60)])
     np.testing.assert_array_equal(*jumps)

@@ -23,7 +23,7 @@ coulomb_friction = 60.0
 
 def drawn(tmp_path, text, lanes=64):
     (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, parameters=tmp_path / "rig.toml", randomize="plant")
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=lanes, parameters=tmp_path / "rig.toml", randomize="plant")
     env.reset(seed=0)
     return env.simulation.plant.lane_parameters
 
@@ -90,6 +90,6 @@ def test_what_is_carried_is_newtons_law():
 
 
 def test_a_drawn_rig_that_cannot_carry_its_mass_is_part_of_the_experiment():
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=8, randomize={"mechanics.mass": (2.0, 30.0)})
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=8, randomize={"mechanics.mass": (2.0, 30.0)})
     env.reset(seed=0)
     env.step(np.zeros((8, 4)))

@@ -14,7 +14,7 @@ from birthsim_env.parts.courses import HASTE, check_points
 from birthsim_env.parts.own_parts import trajectory_of
 from birthsim_env.parts.points import CLOSEST, Sampled, Through
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 COORDINATES = st.sampled_from((0.4, 0.45, 0.5, 0.53)) | st.floats(-1.0, 1.0, allow_subnormal=False)
 ROWS = st.lists(st.tuples(st.floats(1e-2, 50.0), COORDINATES, COORDINATES), min_size=2, max_size=12)
 RAMP_AND_HOLD = [(0, 0.5), (1, 0.5), (2, 0.53), (3, 0.53), (4, 0.53), (5, 0.5), (6, 0.5)]

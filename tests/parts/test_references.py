@@ -141,8 +141,8 @@ class Wave(Trajectory):
 
 def test_a_users_own_trajectory_serves_one_lane_and_many():
     assert_consistent(prepared(Wave()), np.linspace(0.1, 6, 50))
-    many = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, reference=Wave())
-    one = gymnasium.make("BirthSIM/Probe-v2", reference=Wave())
+    many = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=3, reference=Wave())
+    one = gymnasium.make("BirthSIM/Probe-v3", reference=Wave())
     _, infos = many.reset(seed=20)
     one.reset(seed=22)
     np.testing.assert_allclose(infos["tracking_error"], 0.0, atol=1e-12)

@@ -27,7 +27,7 @@ COLUMNS = {
 """Parameter that is drawn -> the row that is it."""
 
 
-def world(name="BirthSIM/Descent-v1", seed=11, lanes=4, **arguments):
+def world(name="BirthSIM/Descent-v2", seed=11, lanes=4, **arguments):
     """Target motion, stiffness setpoints, user force (over the whole episode) and the rigs that a seed draws."""
     env = gymnasium.make_vec(name, num_envs=lanes, **arguments).unwrapped
     env.reset(seed=seed)
@@ -40,7 +40,7 @@ def world(name="BirthSIM/Descent-v1", seed=11, lanes=4, **arguments):
 
 def rigs(lanes=1500, seed=0, **arguments):
     """Parameter name -> (lanes,) as drawn."""
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, **arguments).unwrapped
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=lanes, **arguments).unwrapped
     env.reset(seed=seed)
     return dict(zip(PARAMETER_NAMES, env.simulation.plant.lane_parameters, strict=True))
 
@@ -129,7 +129,7 @@ def test_a_draw_does_not_depend_on_the_order_of_the_names():
 def test_ranges_are_judged_on_the_users_rig():
     bores = {"cylinder1.rod_diameter": 0.02, "cylinder1.piston_diameter": 0.05}
     wide = Parameters().replace({**bores, "chambers.dead_volume": 2e-5})
-    env = gymnasium.make("BirthSIM/Circle-v1", parameters=wide, randomize={"cylinder1.rod_diameter": (0.02, 0.03)})
+    env = gymnasium.make("BirthSIM/Circle-v2", parameters=wide, randomize={"cylinder1.rod_diameter": (0.02, 0.03)})
     assert env.reset(seed=0)[0].shape == (24,)
     # The ranges follow the rig: no chamber is drawn smaller than its largest piston needs.
     low, high = documented_ranges(wide)["chambers.dead_volume"]

@@ -8,7 +8,7 @@ from birthsim_env.parts.sensors.ideal import IdealSensors
 from birthsim_env.parts.sensors.lab import LabSensors
 from tests.parts.test_honest_sensors import board, still, swing, watch
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 
 
 def lab(electronics, motion, ticks):

@@ -14,7 +14,7 @@ from birthsim_env.parts.scenarios import find_scenario, studied_scenarios
 from birthsim_env.registry import names
 from tests.parts.test_moving_hands import minimum_jerk
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 TWO = ((0.0, 0.8), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
 
 
@@ -127,7 +127,7 @@ def test_a_coupling_of_x_and_y_is_drawn_and_reaches_info_and_reference():
     schedule = StiffnessSchedule(
         (0.0, 1.0), (3e3, 2e3), *TWO[2:], closed_loop_y=(1500.0, 1e3), closed_loop_xy=((700, 900), 0.0)
     )
-    env = gymnasium.make("BirthSIM/Probe-v2", stiffness=schedule)
+    env = gymnasium.make("BirthSIM/Probe-v3", stiffness=schedule)
     _, info = env.reset(seed=0)
     coupling = float(env.unwrapped.reference.stiffness_coupling)
     assert 700 <= coupling <= 900

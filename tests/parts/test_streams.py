@@ -156,7 +156,7 @@ def test_lanes_begin_together_as_they_begin_one_by_one(case):
 
 def test_more_lanes_than_begin_together():
     count = TOGETHER + 100
-    envs = [gymnasium.make_vec("BirthSIM/Descent-v1", num_envs=n, randomize=True, sensors="lab").unwrapped for n in (count, 3)]
+    envs = [gymnasium.make_vec("BirthSIM/Descent-v2", num_envs=n, randomize=True, sensors="lab").unwrapped for n in (count, 3)]
     chosen = [0, TOGETHER - 1, count - 1]
     envs[0].reset(seed=50), envs[1].reset(seed=[50 + lane for lane in chosen])
     for (key, many), (_, values) in zip(*(arrays(env.simulation) for env in envs), strict=True):
@@ -224,7 +224,7 @@ def test_knots_of_many_lanes_are_refused_by_the_first_that_is_wrong():
 
 
 def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=50, randomize=True).unwrapped
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=50, randomize=True).unwrapped
     env.reset(seed=0)
     sizes = []
     check = courses._check
@@ -244,7 +244,7 @@ def test_a_users_own_sample_is_the_one_that_is_checked(part):
             return super().sample(time) * np.where(time > 2.0, -1.0, 1.0)
 
     own = {"reference": Away(), "stiffness": Soft()}[part]
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, **{part: own})
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=3, **{part: own})
     words = {"reference": r"reference at 2\.\d+ s: .* unreachable", "stiffness": r"stiffness\.sample\(time = 2\.\d+ s\) = -"}
     with pytest.raises(ValueError, match=words[part]):
         env.reset(seed=0)
@@ -252,7 +252,7 @@ def test_a_users_own_sample_is_the_one_that_is_checked(part):
 
 def test_a_reference_on_the_very_border_of_the_workspace_is_allowed():
     """The quick look is undecided there; the exact one decides."""
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=FixedTarget((0.7, 0.0)), user_force="sine")
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=2, reference=FixedTarget((0.7, 0.0)), user_force="sine")
     env.reset(seed=0)
     with pytest.raises(ValueError, match="unreachable"):
-        gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=FixedTarget((0.7 + 1e-9, 0.0))).reset(seed=0)
+        gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=2, reference=FixedTarget((0.7 + 1e-9, 0.0))).reset(seed=0)

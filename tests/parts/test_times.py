@@ -14,7 +14,7 @@ from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.points import Through
 
-CIRCLE, LASTS = "BirthSIM/Circle-v1", 16.0
+CIRCLE, LASTS = "BirthSIM/Circle-v2", 16.0
 TIMES = np.linspace(0.0, LASTS, 161)
 X = 0.5 + 0.01 * np.sin(TIMES)
 TABLES = {

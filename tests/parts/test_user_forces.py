@@ -119,7 +119,7 @@ def test_vacuum_pulls_are_those_of_births_as_far_as_the_rig_holds_them():
 
 @pytest.mark.parametrize("randomize", [False, True])
 def test_the_rig_can_hold_every_vacuum_pull(randomize):
-    env = gymnasium.make_vec("BirthSIM/Vacuum-v0", num_envs=200, randomize=randomize)
+    env = gymnasium.make_vec("BirthSIM/Vacuum-v1", num_envs=200, randomize=randomize)
     env.reset(seed=0)
     assert required_strength_ratio(env).max() < (0.95 if randomize else 0.98)
 
@@ -158,7 +158,7 @@ def test_a_profile_is_linear_between_knots_and_constant_outside():
 def test_every_push_of_the_circle_is_a_jump_however_small():
     """2 N over 0.1 s change by 20 N/s, less than a forceps' pull of 45 N/s, which is none."""
     for force, jumps in ((AlternatingSteps(amplitude=2.0), True), (Pulls((90.0,), rate=45.0), False)):
-        env = gymnasium.make("BirthSIM/Circle-v1", user_force=force)
+        env = gymnasium.make("BirthSIM/Circle-v2", user_force=force)
         env.reset(seed=0)
         since = [env.step(np.zeros(env.action_space.shape))[4]["since_jump"] for _ in range(115)]
         assert since[98] == pytest.approx(0.99)

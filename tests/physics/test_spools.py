@@ -11,7 +11,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.accuracy.motions import PERIOD, PERIODS, strong
 from tests.physics.test_second_model import start
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 WORN = {"valves.hysteresis": 0.08, "valves.opening_limit": 0.7}
 
 

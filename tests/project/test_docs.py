@@ -7,13 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import gymnasium
 import pytest
 
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
 from birthsim.main import COMMANDS
 from birthsim_env import Parameters
+from birthsim_env.ids import environment_ids
 from birthsim_env.registry import names
 from lab.studies.comparison import tables as comparison_tables
 from lab.studies.scores import tables as score_tables
@@ -78,7 +78,7 @@ def parts(generated):
 
 def test_generated_parts_know_everything(parts):
     commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
-    ids = [name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name]
+    ids = [name for name in environment_ids() if "Residual" not in name]
     fields = [name for section in Parameters().to_dict().values() for name in section]
     named = [*ids, *names("sensors"), *names("hand")]
     for part, known in (

@@ -14,7 +14,7 @@ from tests.console import ROOT
 def test_a_policy_learns_from_tensors_of_a_device():
     pytest.importorskip("torch")
     need_threads()
-    line = [sys.executable, str(ROOT / "examples" / "device_ppo.py"), "host", "BirthSIM/CircleResidual-v1", "110000"]
+    line = [sys.executable, str(ROOT / "examples" / "device_ppo.py"), "host", "BirthSIM/CircleResidual-v2", "110000"]
     said = subprocess.run(line, capture_output=True, text=True, check=True).stdout
     errors = [float(error) for error in re.findall(r"([\d.]+) mm off", said)]
     assert len(errors) == 26

@@ -22,7 +22,7 @@ RELEASED = re.search(r"^## \S+ \((.*)\)$", (ROOT / "CHANGELOG.md").read_text(enc
 STARTS = """
 import sys, gymnasium, birthsim_env
 for make in (gymnasium.make, lambda name, **how: gymnasium.make_vec(name, num_envs=3, **how)):
-    env = make("BirthSIM/Circle-v1", sensors="lab", randomize=True)
+    env = make("BirthSIM/Circle-v2", sensors="lab", randomize=True)
     env.reset(seed=0)
     env.step(env.action_space.sample())
 print([name for name in ("numba", "llvmlite", "scipy") if name in sys.modules])

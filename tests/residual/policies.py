@@ -10,7 +10,7 @@ from agents.policy.network import PolicyNetwork
 from agents.residual.corrected import observation_names
 from agents.residual.settings import ResidualSettings
 
-ENVIRONMENT = "BirthSIM/ProbeResidual-v2"
+ENVIRONMENT = "BirthSIM/ProbeResidual-v3"
 SETTINGS = ResidualSettings("backstepping-weight", authority=33.0, time_constant=0.04, policy_period=0.02)
 INPUTS = len(observation_names(SETTINGS))
 TRAINING = {"steps": 7, "seed": 3, "curve": [{"steps": 0, "pooled_mm": 1.5}]}

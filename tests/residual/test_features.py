@@ -13,7 +13,7 @@ from birthsim_env.observation import LIMIT
 def test_what_is_shown_is_true_with_exact_sensors(law, reach):
     """Place = target + F/K + what is owed + error, and the same of speeds, a control period before the observation."""
     arguments = {"num_envs": 3, "user_force": "noise", "randomize": True, "informed": True, "policy_period": 1e-3}
-    env = gymnasium.make_vec("BirthSIM/CircleResidual-v1", law=law, **arguments)
+    env = gymnasium.make_vec("BirthSIM/CircleResidual-v2", law=law, **arguments)
     env.reset(seed=3)
     rng, largest = np.random.default_rng(0), 0.0
     for _ in range(300):

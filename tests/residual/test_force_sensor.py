@@ -8,7 +8,7 @@ from agents.residual.settings import LAWS, NO_LAW, ResidualSettings, needs_force
 from birthsim_env.parts.sensors.honest import HonestSensors
 from tests.registered import registered
 
-CIRCLE, LANES, STEPS = "BirthSIM/CircleResidual-v1", 3, 140
+CIRCLE, LANES, STEPS = "BirthSIM/CircleResidual-v2", 3, 140
 BLIND = [law for law in LAWS if not needs_force(law)]
 
 
@@ -47,7 +47,7 @@ def test_what_a_force_sensor_would_show_changes_no_bit(law, monkeypatch):
 
 
 def test_the_force_that_is_shown_is_zero_from_the_first_observation_on():
-    env = gymnasium.make("BirthSIM/Circle-v1", sensors="lab", force_sensor=False).unwrapped
+    env = gymnasium.make("BirthSIM/Circle-v2", sensors="lab", force_sensor=False).unwrapped
     observation, _ = env.reset(seed=0)
     felt = [k for k, name in enumerate(env.observation_names) if name.startswith("user force")]
     assert len(felt) == 2

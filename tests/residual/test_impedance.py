@@ -18,7 +18,7 @@ from birthsim_env.physics.plant import Plant
 from birthsim_env.registry import names
 from tests.oracles import closed_loop
 
-PROBE, CIRCLE = "BirthSIM/ProbeResidual-v2", "BirthSIM/CircleResidual-v1"
+PROBE, CIRCLE = "BirthSIM/ProbeResidual-v3", "BirthSIM/CircleResidual-v2"
 
 
 def test_the_target_moves_so_that_a_hand_at_rest_feels_what_was_asked_for() -> None:
@@ -154,7 +154,7 @@ def test_the_last_entry_raises_the_damping_up_to_twice_and_lowers_it_never() -> 
 def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
     arguments = {"num_envs": 3, "sensors": sensors, "randomize": True}
     inside = gymnasium.make_vec(PROBE, law="none", **arguments)
-    outside = gymnasium.make_vec("BirthSIM/Probe-v2", **arguments)
+    outside = gymnasium.make_vec("BirthSIM/Probe-v3", **arguments)
     inside.reset(seed=6), outside.reset(seed=6)
     for action in np.random.default_rng(0).uniform(-0.1, 0.1, (60, 3, 4)).astype(np.float32):
         for one, other in zip(inside.step(action)[1:4], outside.step(action)[1:4], strict=True):

@@ -21,7 +21,7 @@ EXAMPLE = ROOT / "examples" / "onnx_policy.py"
 
 def positions(controller, sensors):
     """Of the end effector (T, 2), m, over a second of one rig under the controller."""
-    env = gymnasium.make("BirthSIM/Probe-v2", policy_period=1e-3, randomize=True, sensors=sensors)
+    env = gymnasium.make("BirthSIM/Probe-v3", policy_period=1e-3, randomize=True, sensors=sensors)
     env.reset(seed=4)
     controller.reset()
     path = []
@@ -44,7 +44,7 @@ def test_the_example_moves_the_rig_as_the_controller_does(tmp_path, squashed, ce
     expected = positions(ResidualController(rig, tmp_path), sensors)
     assert np.ptp(expected, axis=0).max() > 1e-3
     mine, environment = runpy.run_path(str(EXAMPLE))["onnx_controller"](tmp_path / "policy.onnx", rig)
-    assert environment == "BirthSIM/Probe-v2"
+    assert environment == "BirthSIM/Probe-v3"
     np.testing.assert_allclose(positions(mine, sensors), expected, rtol=0, atol=close)
 
 

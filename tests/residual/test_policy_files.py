@@ -81,7 +81,7 @@ def test_running_a_policy_needs_neither_torch_nor_stable_baselines(folder):
         "from birthsim_env import Parameters\n"
         "import gymnasium, sys\n"
         f"law = make_controller('residual', Parameters(), policy={str(folder)!r})\n"
-        "env = gymnasium.make_vec('BirthSIM/Circle-v1', num_envs=2)\n"
+        "env = gymnasium.make_vec('BirthSIM/Circle-v2', num_envs=2)\n"
         "env.reset(seed=0)\n"
         "print(law.command(env.measurement, env.reference).shape)\n"
     )

@@ -11,7 +11,7 @@ LANES = 64
 
 
 def make(**arguments):
-    env = gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=LANES, **arguments)
+    env = gymnasium.make_vec("BirthSIM/CircleResidual-v2", num_envs=LANES, **arguments)
     env.reset(seed=5)
     return env
 

@@ -35,8 +35,8 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     save_policy(stored, tmp_path)
     controller, steps, lanes = ResidualController(rig, tmp_path), 60, 5
     arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes, "parameters": rig}
-    inside = gymnasium.make_vec("BirthSIM/CircleResidual-v1", **arguments, **settings.to_dict())
-    outside = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
+    inside = gymnasium.make_vec("BirthSIM/CircleResidual-v2", **arguments, **settings.to_dict())
+    outside = gymnasium.make_vec("BirthSIM/Circle-v2", policy_period=1e-3, **arguments)
     observation, _ = inside.reset(seed=11)
     outside.reset(seed=11)
     act = stored.network.acting()
@@ -51,7 +51,7 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     assert np.ptp(actions, axis=0).max() > 0.1 * reach, "it says different things in different worlds"
     # It is not the law alone that went there.
     if settings.law != "none":
-        plain = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
+        plain = gymnasium.make_vec("BirthSIM/Circle-v2", policy_period=1e-3, **arguments)
         law = make_controller(settings.law, rig)
         plain.reset(seed=11)
         for _ in range(10 * steps):
@@ -60,7 +60,7 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
 
 
 def test_any_function_is_a_policy(tmp_path):
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
+    env = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=3, policy_period=1e-3)
     stored = policy(ResidualSettings(policy_period=0.02), reach=0.5)
     save_policy(stored, tmp_path)
     given = ResidualController(None, lambda seen: stored.network.actions(seen).astype(float), stored.settings)

@@ -16,7 +16,7 @@ from birthsim_env.registry import names
 from tests.oracles.residual_parts import UnexplainedForceObserver
 
 IDS = tuple(environment_id(name, "Residual") for name in names("scenario"))
-CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v2", "BirthSIM/ProbeResidual-v3"
 RIG = Parameters()
 
 

@@ -115,6 +115,6 @@ def test_one_file_is_reference_and_stiffness(tmp_path):
     asked = schedules[0].sample(np.array([0.0, 12.0] * 200))[0]
     assert asked[0] == 3500.0
     assert abs(asked[1] - labour.course(FASTER)[-1, 3]) < 250.0
-    env = gymnasium.make("BirthSIM/Probe-v2", reference=file, stiffness=file, user_force=None)
+    env = gymnasium.make("BirthSIM/Probe-v3", reference=file, stiffness=file, user_force=None)
     env.reset(seed=0)
     np.testing.assert_allclose(env.unwrapped.reference.position, (0.42, -0.04))

@@ -20,7 +20,7 @@ from lab.studies.comparison.headline import CONTROLLERS, is_shown, learns_mass
 from lab.studies.comparison.privileged import TOLD, evaluate_privileged, privileged_controller
 from lab.studies.leaderboard import RULES, TABLE, table
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 PAPER = ("figure4",)
 """Studies of the paper's own experiment, in which nothing is drawn."""
 SEEDS = re.compile(r"seeds? (?:from |= )?(\d+)")

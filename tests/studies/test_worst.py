@@ -21,7 +21,7 @@ RANGES = documented_ranges(RIG)
 def test_the_found_world_is_worse_than_all_drawn_ones_and_comes_again_in_every_bit():
     found = worst.worst("admittance-adaptive", "ideal", RIG.to_dict(), "stiffness_error", 15.0, 3.0, episodes=8, seed=SEED)
     law = make_controller("admittance-adaptive", RIG)
-    done = evaluate("BirthSIM/Probe-v2", law, "law", 8, SEED, False, randomize=True)
+    done = evaluate("BirthSIM/Probe-v3", law, "law", 8, SEED, False, randomize=True)
     sizes = np.abs(done.metrics["stiffness_error"])
     assert found["named"][0] == [SEED + int(np.argmax(sizes)), done.metrics["stiffness_error"][int(np.argmax(sizes))]]
     world = found["found"]
@@ -29,7 +29,7 @@ def test_the_found_world_is_worse_than_all_drawn_ones_and_comes_again_in_every_b
     assert world["strength"] <= 1.0
     fixed = {name: [value, value] for name, value in world["figures"].items()}
     rig = Parameters.from_dict({**RIG.to_dict(), "randomize": fixed})
-    again = evaluate("BirthSIM/Probe-v2", law, "law", 1, world["seed"], False, randomize=True, parameters=rig)
+    again = evaluate("BirthSIM/Probe-v3", law, "law", 1, world["seed"], False, randomize=True, parameters=rig)
     assert np.abs(again.metrics["stiffness_error"]) == [world["size"]]
     figures = {row[0] for row in world["changes"]}
     assert "s of rest" in figures
@@ -57,7 +57,7 @@ def test_a_search_finds_the_corner_in_which_a_size_is_largest():
 
 
 def test_a_world_is_told_as_the_environment_draws_it():
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=1, randomize=True, sensors="honest", policy_period=0.5)
+    env = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=1, randomize=True, sensors="honest", policy_period=0.5)
     env.reset(seed=[SEED])
     mass = env.simulation.plant.lane_parameters[MASS, 0]
     noise = env.simulation.sensors.parameters["position_noise"][0]

@@ -10,7 +10,7 @@ from lab.studies.sweeps.plan import HeatMap, Range, load_sweep
 
 WHOLE = """
 [base]
-environment = "BirthSIM/Probe-v2"
+environment = "BirthSIM/Probe-v3"
 episodes = 4
 seed = 7
 
@@ -42,7 +42,7 @@ def sweep(tmp_path):
 
 def test_every_combination_of_the_grid_meets_every_draw(sweep):
     found = sweep(WHOLE)
-    assert (found.base["environment"], found.base["episodes"], found.base["seed"]) == ("BirthSIM/Probe-v2", 4, 7)
+    assert (found.base["environment"], found.base["episodes"], found.base["seed"]) == ("BirthSIM/Probe-v3", 4, 7)
     assert len(found.points) == 2 * 3 * 5
     assert {(point["controller"], point["rig.mechanics.mass"]) for point in found.points} == {
         (name, mass) for name in ("backstepping", "pid") for mass in (2.0, 3.0, 4.0)

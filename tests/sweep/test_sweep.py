@@ -19,7 +19,7 @@ from tests.console import call
 
 GRID = """
 [base]
-environment = "BirthSIM/Probe-v2"
+environment = "BirthSIM/Probe-v3"
 randomize = "scenario"
 episodes = 2
 seed = 5
@@ -71,7 +71,7 @@ def test_a_grid_gives_the_same_bytes_with_one_process_with_two_and_after_a_longe
     rig = Parameters()
     heavy = rig.replace({"mechanics.mass": 4.0})
     plain = evaluate(
-        "BirthSIM/Probe-v2", make_controller("pid", rig), "pid", 2, 5, progress=False, parameters=heavy, randomize="scenario"
+        "BirthSIM/Probe-v3", make_controller("pid", rig), "pid", 2, 5, progress=False, parameters=heavy, randomize="scenario"
     )
     np.testing.assert_array_equal([row["settled_rms"] for row in rows[6:]], plain.metrics["settled_rms"])
     assert rows[6]["return_0.9"] == plain.returns[0.9][0]
@@ -89,7 +89,7 @@ def test_a_grid_gives_the_same_bytes_with_one_process_with_two_and_after_a_longe
 def test_a_search_proposes_the_same_whatever_has_been_kept(swept):
     text = """
         [base]
-        environment = "BirthSIM/Probe-v2"
+        environment = "BirthSIM/Probe-v3"
         controller = "pid"
         episodes = 2
         randomize = "scenario"

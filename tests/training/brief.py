@@ -7,7 +7,7 @@ import numpy as np
 from agents.training.configuration import TrainingSettings
 
 TINY = TrainingSettings(
-    "BirthSIM/ProbeResidual-v2",
+    "BirthSIM/ProbeResidual-v3",
     steps=1024,
     lanes=8,
     rollout=16,

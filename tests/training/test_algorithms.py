@@ -14,7 +14,7 @@ from agents.training.configuration import STABLE_BASELINES, TrainingSettings
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.algorithms import make_model, network_of, unchecked_distributions
 
-CIRCLE = "BirthSIM/CircleResidual-v1"
+CIRCLE = "BirthSIM/CircleResidual-v2"
 TINY = TrainingSettings(CIRCLE, lanes=8, rollout=32, batch=64, epochs=2, gradient_steps=2, learning_rate=3e-3, hidden=(16, 16))
 VARIABLE = ResidualSettings(impedance="variable")
 

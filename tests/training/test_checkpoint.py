@@ -24,7 +24,7 @@ from birthsim_env import Parameters
 from tests.residual.policies import Trap
 from tests.training.brief import TINY
 
-PROBE = "BirthSIM/ProbeResidual-v2"
+PROBE = "BirthSIM/ProbeResidual-v3"
 RESIDUAL = ResidualSettings()
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"reached": {"policy": None, "curve": [{"steps": 0, "x": 0.1}]}, "due": 256.0}
 

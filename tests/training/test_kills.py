@@ -49,7 +49,7 @@ SLOW = pytest.mark.slow
 UPDATE = (policy_gradient.PolicyGradient, "_update", 60)
 """Some way beyond the validation half way."""
 SAC = replace(TINY, algorithm="sac", steps=384)
-LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v1")
+LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v2")
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, 
 
 
 CONFIGURATION = """[training]
-environment = "BirthSIM/ProbeResidual-v2"
+environment = "BirthSIM/ProbeResidual-v3"
 steps = 4096
 lanes = 8
 rollout = 32

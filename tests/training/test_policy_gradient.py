@@ -10,7 +10,7 @@ from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
 
 SHORT = TrainingSettings(
-    environment="BirthSIM/ProbeResidual-v2",
+    environment="BirthSIM/ProbeResidual-v3",
     algorithm="apg",
     steps=20_480,
     lanes=32,
@@ -22,7 +22,7 @@ SHORT = TrainingSettings(
     validations=2,
 )
 PURE = ResidualSettings(law="none", policy_period=0.02)
-BESIDE = replace(SHORT, target="impedance", beside=("BirthSIM/ProbeResidual-v2 guided",))
+BESIDE = replace(SHORT, target="impedance", beside=("BirthSIM/ProbeResidual-v3 guided",))
 INFORMED = replace(PURE, informed=True)
 
 

@@ -16,7 +16,7 @@ from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.privileged import Privileged
 from agents.training.sb3.shifted_reward import ShiftedReward
 
-PROBE, RESIDUAL = "BirthSIM/Probe-v2", "BirthSIM/CircleResidual-v1"
+PROBE, RESIDUAL = "BirthSIM/Probe-v3", "BirthSIM/CircleResidual-v2"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)
 """Lane 0 runs into an end stop after some tenths of a second, the others live until their time is over."""
 
@@ -158,7 +158,7 @@ def test_every_value_is_less_by_the_same(rewards, truncated, discount):
 
 def test_every_observation_has_the_figures_of_its_own_episode():
     lanes = gymnasium.make_vec(
-        "BirthSIM/ProbeResidual-v2", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
+        "BirthSIM/ProbeResidual-v3", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
     )
     env = Privileged(SB3VecEnv(lanes, staggered=True))
     env.seed(0)

@@ -164,7 +164,7 @@ def test_evaluation_says_of_a_policy_that_was_trained_with_other_sensors(tmp_pat
 
 
 def test_scores_are_of_policies_that_were_trained_with_their_sensors():
-    names = {policy.partition("/")[0] for _, policy in _contestants("BirthSIM/Circle-v1") if policy}
+    names = {policy.partition("/")[0] for _, policy in _contestants("BirthSIM/Circle-v2") if policy}
     assert names == {"circle", "circle_lab", "circle_pure", "circle_apg", "circle_residual_apg", "circle_lab_apg"}
 
 
@@ -188,14 +188,14 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkey
 
 @pytest.mark.slow
 def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_path, monkeypatch, capsys):
-    asked, result = [], evaluate_piece("pid", "", Parameters().to_dict(), "BirthSIM/Probe-v2", {"duration": 4.5}, [], 0, 4)
+    asked, result = [], evaluate_piece("pid", "", Parameters().to_dict(), "BirthSIM/Probe-v3", {"duration": 4.5}, [], 0, 4)
 
     def computed(tasks, folder, jobs, title, cluster):
         asked.extend(Path(task.settings.get("policy", task.settings["controller"])).name for task in tasks)
         return {task.name: result for task in tasks}, {}
 
     monkeypatch.setattr(command, "run_tasks", computed)
-    command.run(command.Settings(env="BirthSIM/Probe-v2", controller=["residual"], episodes=4, out=tmp_path))
+    command.run(command.Settings(env="BirthSIM/Probe-v3", controller=["residual"], episodes=4, out=tmp_path))
     assert asked == ["backstepping", "backstepping-force-first", *(f"seed_{k}" for k in range(5))]
     assert "residual, 5 seeds " in capsys.readouterr().out
     for page in ("evaluation.md", "seeds.md"):

@@ -53,7 +53,7 @@ def teachers(tmp_path_factory):
     folder = tmp_path_factory.mktemp("teachers")
     for seed in (0, 1):
         settings = TrainingSettings(
-            "BirthSIM/ProbeResidual-v2",
+            "BirthSIM/ProbeResidual-v3",
             steps=64,
             seed=seed,
             lanes=4,

@@ -27,7 +27,7 @@ from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
 from tests.training.brief import steady
 
-PROBE = "BirthSIM/ProbeResidual-v2"
+PROBE = "BirthSIM/ProbeResidual-v3"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(
     PROBE,
@@ -138,13 +138,13 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     rig = Parameters().replace({"mechanics.mass": 4.0})
     residual = ResidualSettings("backstepping-weight", "variable_kp", 22.0, 0.05, 0.02)
     brief = replace(BRIEF, seed=30, lanes=4, steps=256, batch=64)
-    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v1", sensors="lab", randomize="plant", margin=0.25)
+    settings = replace(brief, environment="BirthSIM/ForcepsResidual-v2", sensors="lab", randomize="plant", margin=0.25)
     train(settings, residual, tmp_path, rig)
     expected = {"sensors": "lab", "randomize": "plant", **residual.to_dict()}
     expected["autoreset_mode"] = gymnasium.vector.AutoresetMode.SAME_STEP
     # Only training meets the margin.
     for (name, arguments, _), own in zip(made, (widened(rig, 0.25), rig), strict=True):
-        assert name == "BirthSIM/ForcepsResidual-v1"
+        assert name == "BirthSIM/ForcepsResidual-v2"
         assert arguments == {**expected, "parameters": own, "num_envs": 4}
     # Seed 30 starts from worlds of its own; all validations take the same ones, which training never meets.
     (_, _, trains), (_, _, checks) = made
@@ -168,8 +168,8 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
     arguments = {"randomize": True, "duration": 4.5}
     inside = gymnasium.make_vec(PROBE, num_envs=5, **arguments)
     score = validate(inside, read_policy(folder).network.acting(), 40)
-    result = evaluate("BirthSIM/Probe-v2", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
-    law = evaluate("BirthSIM/Probe-v2", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
+    result = evaluate("BirthSIM/Probe-v3", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
+    law = evaluate("BirthSIM/Probe-v3", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
     np.testing.assert_allclose(result.metrics["settled_rms"], score.error, rtol=0.02)
     np.testing.assert_array_equal(result.required_strength_ratio, score.required_strength_ratio)
@@ -224,7 +224,7 @@ def test_a_full_disk_is_said_once_with_the_place_and_without_a_traceback(tmp_pat
 
 def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
     settings = TrainingSettings(
-        "BirthSIM/ProbeResidual-v2", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
+        "BirthSIM/ProbeResidual-v3", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
     )
     train(settings, ResidualSettings(), tmp_path)
     policy = read_policy(tmp_path)

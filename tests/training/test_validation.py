@@ -10,7 +10,7 @@ from agents.training import validation
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from tests.training.brief import zero
 
-PROBE = "BirthSIM/ProbeResidual-v2"
+PROBE = "BirthSIM/ProbeResidual-v3"
 
 
 class Fake:

@@ -35,9 +35,9 @@ def functions_run(work, *arguments):
 @pytest.mark.parametrize(
     ("controller", "environment", "world"),
     [
-        ("pid", "BirthSIM/Circle-v1", {"sensors": "lab", "randomize": True}),
-        ("limited:admittance-adaptive", "BirthSIM/Probe-v2", {"sensors": "honest"}),
-        ("residual:circle", "BirthSIM/Circle-v1", {}),
+        ("pid", "BirthSIM/Circle-v2", {"sensors": "lab", "randomize": True}),
+        ("limited:admittance-adaptive", "BirthSIM/Probe-v3", {"sensors": "honest"}),
+        ("residual:circle", "BirthSIM/Circle-v2", {}),
     ],
 )
 def test_whatever_runs_is_reached(controller, environment, world):

@@ -60,7 +60,7 @@ class UserForce(Staged):
     ...         self.strength = np.where(np.arange(num_envs) % 2, 20.0, 10.0)
     ...     def force(self, time, position, velocity):
     ...         return np.stack([self.strength + 0 * time, 0 * time], axis=1)
-    >>> worlds = birthsim.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force=Pull(), duration=1.0)
+    >>> worlds = birthsim.make_vec("BirthSIM/Circle-v2", num_envs=2, user_force=Pull(), duration=1.0)
     >>> observations, infos = worlds.reset(seed=0)
     >>> infos["user_force"].tolist()
     [[10.0, 0.0], [20.0, 0.0]]
@@ -204,7 +204,7 @@ class ForceProfile(CompiledForce):
 
     >>> import birthsim
     >>> push = birthsim.ForceProfile([(1.0, 0.0, 0.0), (2.0, 20.0, 0.0)])
-    >>> env = birthsim.make("BirthSIM/Circle-v1", user_force=push)
+    >>> env = birthsim.make("BirthSIM/Circle-v2", user_force=push)
     >>> observation, info = env.reset(seed=0)
     >>> for _ in range(150):
     ...     observation, reward, terminated, truncated, info = env.step(env.action_space.sample() * 0)

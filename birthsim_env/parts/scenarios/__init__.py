@@ -13,6 +13,8 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.registry import entries, entry
 
+MEASURED_RIG = "its rig has the valves and seals that others measured (docs/validation.md), and its worlds are drawn anew"
+
 Parts = tuple[Trajectory, UserForce, StiffnessSchedule]
 """What a scenario is made of: target, hand and stiffness setpoints."""
 
@@ -32,6 +34,9 @@ class Scenario:
 
     version: ClassVar[int] = 0
     """The version in its id. A change of trajectories or rewards takes a new one."""
+
+    changed: ClassVar[str] = "its trajectories or rewards changed"
+    """What changed with ``version``, for whoever asks for a former one."""
 
     studied: ClassVar[bool] = False
     """Whether studies measure it. Reference scores, fingerprints and a training's configuration are then stored of it."""

@@ -2,7 +2,7 @@
 
 from birthsim_env.parts.hands.steps import AlternatingSteps
 from birthsim_env.parts.references import Circle
-from birthsim_env.parts.scenarios import Parts, Scenario
+from birthsim_env.parts.scenarios import MEASURED_RIG, Parts, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.registry import register
 
@@ -13,7 +13,8 @@ class CircleUnderPushes(Scenario):
 
     title = "Circle under pushes (Fig. 4)"
     duration = 16.0
-    version = 1
+    version = 2
+    changed = MEASURED_RIG
     studied = True
 
     def nominal(self) -> Parts:

@@ -4,7 +4,7 @@ import math
 
 from birthsim_env.parts.hands.pulls import Pulls
 from birthsim_env.parts.references import FixedTarget
-from birthsim_env.parts.scenarios import Parts, Scenario
+from birthsim_env.parts.scenarios import MEASURED_RIG, Parts, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.registry import register
 
@@ -15,7 +15,8 @@ class Forceps(Scenario):
 
     title = "Forceps traction"
     duration = 15.0
-    version = 1
+    version = 2
+    changed = MEASURED_RIG
     studied = True
 
     def nominal(self) -> Parts:

@@ -2,7 +2,7 @@
 
 from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.references import FixedTarget
-from birthsim_env.parts.scenarios import Parts, Scenario
+from birthsim_env.parts.scenarios import MEASURED_RIG, Parts, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.registry import register
 
@@ -16,7 +16,8 @@ class Probe(Scenario):
 
     title = "Stiffness test: hold and be pushed"
     duration = 7.0
-    version = 2
+    version = 3
+    changed = MEASURED_RIG
     studied = True
 
     def nominal(self) -> Parts:

@@ -5,7 +5,7 @@ import math
 from birthsim_env.parts.hands.pulls import Pulls
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.references import Path
-from birthsim_env.parts.scenarios import Parts, Scenario
+from birthsim_env.parts.scenarios import MEASURED_RIG, Parts, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.registry import register
 
@@ -16,7 +16,8 @@ class Vacuum(Scenario):
 
     title = "Vacuum extraction"
     duration = 24.0
-    version = 0
+    version = 1
+    changed = MEASURED_RIG
     studied = True
 
     def nominal(self) -> Parts:

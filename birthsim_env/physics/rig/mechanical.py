@@ -69,10 +69,10 @@ class Cylinder(Section):
         "N/Pa",
         "growth of Coulomb friction with the sum of both gauge pressures",
         default=5e-6,
-        source="0.23 to 0.91 N/bar fitted to four seals of 25 mm that Zillen 2021 measured; docs/validation.md",
+        source="0.2 to 1.2 N/bar fitted to four seals of 25 mm that Zillen 2021 measured; docs/validation.md",
         least=0,
         most=1e-3,
-        range=(2e-6, 9e-6),
+        range=(2e-6, 1.2e-5),
         row="fp",
     )
     direction_asymmetry: float = parameter(

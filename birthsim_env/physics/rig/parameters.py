@@ -70,7 +70,7 @@ class Parameters:
     >>> rig = birthsim.Parameters().replace({"mechanics.mass": 4.0})
     >>> rig.mechanics.mass, rig.cylinder2.stroke
     (4.0, 0.4)
-    >>> env = birthsim.make("BirthSIM/Circle-v1", parameters=rig)
+    >>> env = birthsim.make("BirthSIM/Circle-v2", parameters=rig)
     """
 
     geometry: Geometry = Geometry()

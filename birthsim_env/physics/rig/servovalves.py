@@ -82,7 +82,7 @@ class Valves(Section):
         source="assumed, -3 dB at 40 Hz; the data sheet has 125 Hz for the spool of an MPYE-5-M5, 1.3 ms (docs/valves.md)",
         least=2e-4,
         most=10,
-        range=(0.0015, 0.008),
+        range=(0.0012, 0.008),
         identified=Prior(0.7),
         row="tau",
     )

@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "studies" / "speed"))
 from stopwatch import seconds_per_call, step, vector_step
 from twin import Twin
 
-ENVIRONMENT, LANES, STEPS, BUDGET = "BirthSIM/Circle-v1", 256, round(0.01 / dynamics.INTEGRATION_STEP), 2.0
+ENVIRONMENT, LANES, STEPS, BUDGET = "BirthSIM/Circle-v2", 256, round(0.01 / dynamics.INTEGRATION_STEP), 2.0
 """Lanes beside each other, integration steps in a policy step, and CPU seconds of a measurement."""
 
 

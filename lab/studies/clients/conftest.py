@@ -24,7 +24,7 @@ def example():
     """Runs a file of ``examples/`` on the stiffness test and returns the scores it prints."""
 
     def run(name, steps=45_000):
-        command = [sys.executable, "-P", str(EXAMPLES / f"{name}.py"), "BirthSIM/Probe-v2", str(steps)]
+        command = [sys.executable, "-P", str(EXAMPLES / f"{name}.py"), "BirthSIM/Probe-v3", str(steps)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)
         assert done.returncode == 0, done.stderr[-3000:]
         return [float(score) for score in re.findall(r"^\s*[\d,]+ steps: .* score (-?\d+)$", done.stdout, re.MULTILINE)]
@@ -40,7 +40,7 @@ def mean_return():
     """
 
     def measure(policy, episodes=4):
-        env = gym.make("BirthSIM/Circle-v1", randomize=True)
+        env = gym.make("BirthSIM/Circle-v2", randomize=True)
         total = []
         for seed in range(1000, 1000 + episodes):
             observation, paid, over = env.reset(seed=seed)[0], 0.0, False

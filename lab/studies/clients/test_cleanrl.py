@@ -36,7 +36,7 @@ def trained(tmp_path_factory):
         three = gym.wrappers.TransformObservation
         patch.setattr(gym.wrappers, "TransformObservation", lambda env, change: three(env, change, env.observation_space))
         patch.setattr(
-            sys, "argv", [str(file), "--env-id", "birthsim_env:BirthSIM/Circle-v1", f"--total-timesteps={STEPS}", *arguments]
+            sys, "argv", [str(file), "--env-id", "birthsim_env:BirthSIM/Circle-v2", f"--total-timesteps={STEPS}", *arguments]
         )
         patch.chdir(tmp_path_factory.mktemp("cleanrl"))
         return runpy.run_path(str(file), run_name="__main__")

@@ -50,7 +50,7 @@ def test_the_files_are_those_of_joblibs_processes(cluster, tmp_path):
 
 
 def test_an_evaluation_has_the_same_bytes(cluster, tmp_path):
-    world = ("--env", "BirthSIM/Probe-v2", "--controller", "backstepping", "pid", "--episodes", "4")
+    world = ("--env", "BirthSIM/Probe-v3", "--controller", "backstepping", "pid", "--episodes", "4")
     for name, workers in (("joblib", ("--jobs", "2")), ("ray", ("--cluster", cluster))):
         command = [sys.executable, "-m", "birthsim", "evaluate", *world, "--out", str(tmp_path / name), *workers]
         subprocess.run(command, check=True, capture_output=True)
@@ -61,7 +61,7 @@ def test_an_evaluation_has_the_same_bytes(cluster, tmp_path):
 def test_two_devices_in_two_workers_are_one(cluster):
     law = make_controller("admittance-backstepping", Parameters())
     world = {"sensors": "lab", "randomize": True, "duration": 0.3}
-    run, parts = partial(evaluate_on, "host", "BirthSIM/Circle-v1", law, "law", **world), {}
+    run, parts = partial(evaluate_on, "host", "BirthSIM/Circle-v2", law, "law", **world), {}
     side_by_side(run, [(3, 0), (4, 3)], 2, parts.__setitem__, cluster)
     assert json.dumps(merged([parts[0], parts[1]], "law").to_dict()) == json.dumps(run(7, 0).to_dict())
 

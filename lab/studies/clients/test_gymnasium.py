@@ -34,11 +34,11 @@ def actions():
 
 @pytest.fixture
 def bare(actions):
-    return rollout(gym.make("BirthSIM/Circle-v1", sensors="lab", randomize=True), actions)
+    return rollout(gym.make("BirthSIM/Circle-v2", sensors="lab", randomize=True), actions)
 
 
 def circle(**arguments):
-    return gym.make("BirthSIM/Circle-v1", sensors="lab", randomize=True, **arguments)
+    return gym.make("BirthSIM/Circle-v2", sensors="lab", randomize=True, **arguments)
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -104,7 +104,7 @@ def test_normalised_observations_are_the_bare_ones_scaled(actions, bare):
 
 
 def test_statistics_are_the_sum_of_rewards():
-    env, total, steps, over = wrappers.RecordEpisodeStatistics(gym.make("BirthSIM/Probe-v2")), 0.0, 0, False
+    env, total, steps, over = wrappers.RecordEpisodeStatistics(gym.make("BirthSIM/Probe-v3")), 0.0, 0, False
     env.reset(seed=1)
     while not over:
         *_, reward, terminated, truncated, info = env.step(np.zeros(4, dtype=np.float32))
@@ -114,7 +114,7 @@ def test_statistics_are_the_sum_of_rewards():
 
 
 def test_a_film_is_recorded_of_every_step(tmp_path):
-    env = wrappers.RecordVideo(gym.make("BirthSIM/Probe-v2", render_mode="rgb_array"), str(tmp_path), disable_logger=True)
+    env = wrappers.RecordVideo(gym.make("BirthSIM/Probe-v3", render_mode="rgb_array"), str(tmp_path), disable_logger=True)
     env.reset(seed=1)
     for _ in range(20):
         env.step(np.zeros(4, dtype=np.float32))
@@ -158,7 +158,7 @@ def test_vector_wrappers_say_the_same_of_both():
             wrappers.vector.NormalizeObservation(wrappers.vector.RecordEpisodeStatistics(worlds))
         )
 
-    name, lanes = "BirthSIM/Probe-v2", 4
+    name, lanes = "BirthSIM/Probe-v3", 4
     native = wrapped(gym.make_vec(name, num_envs=lanes, randomize=True, max_episode_steps=30))
     theirs = wrapped(SyncVectorEnv([lambda: gym.make(name, randomize=True, max_episode_steps=30)] * lanes))
     np.testing.assert_array_equal(native.reset(seed=3)[0], theirs.reset(seed=3)[0])
@@ -174,12 +174,12 @@ def test_vector_wrappers_say_the_same_of_both():
 
 
 def test_an_environment_is_made_again_from_its_spec(actions, bare):
-    again = gym.make(gym.spec("BirthSIM/Circle-v1"), sensors="lab", randomize=True)
+    again = gym.make(gym.spec("BirthSIM/Circle-v2"), sensors="lab", randomize=True)
     np.testing.assert_array_equal(rollout(again, actions)[0], bare[0])
     np.testing.assert_array_equal(rollout(gym.make(circle().spec), actions)[0], bare[0])
 
 
 def test_scores_come_with_the_wheel():
-    known = birthsim_env.reference_scores("BirthSIM/Circle-v1")
-    scores = [birthsim_env.normalized_score("BirthSIM/Circle-v1", one["return"]) for one in known.values()]
+    known = birthsim_env.reference_scores("BirthSIM/Circle-v2")
+    scores = [birthsim_env.normalized_score("BirthSIM/Circle-v2", one["return"]) for one in known.values()]
     assert [round(score) for score in (min(scores, key=abs), max(scores))] == [0, 100]

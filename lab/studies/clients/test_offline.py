@@ -54,14 +54,14 @@ def test_a_killed_export_leaves_no_dataset_and_the_same_command_then_writes_it(t
 def test_its_scores_are_the_projects(dataset):
     returns = np.array([episode.rewards.sum() for episode in dataset.iterate_episodes()])
     np.testing.assert_allclose(
-        100 * minari.get_normalized_score(dataset, returns), normalized_score("BirthSIM/Circle-v1", returns)
+        100 * minari.get_normalized_score(dataset, returns), normalized_score("BirthSIM/Circle-v2", returns)
     )
     assert returns.mean() > 1200
 
 
 def test_minaris_own_collector_records_an_episode(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    env = minari.DataCollector(gym.make("BirthSIM/Probe-v2", randomize=True), record_infos=True)
+    env = minari.DataCollector(gym.make("BirthSIM/Probe-v3", randomize=True), record_infos=True)
     env.reset(seed=1)
     for _ in range(700):
         env.step(np.zeros(4, np.float32))

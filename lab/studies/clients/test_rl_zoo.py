@@ -13,7 +13,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecNormalize
 
 FILE = Path(__file__).resolve().parent / "rl_zoo_ppo.yml"
-NAME = "BirthSIM/Circle-v1"
+NAME = "BirthSIM/Circle-v2"
 
 
 def command(module, *arguments):
@@ -53,7 +53,7 @@ def test_its_model_is_better_than_before(run, mean_return):
         return lambda observation: model.predict(worlds.normalize_obs(observation), deterministic=True)[0]
 
     untrained = mean_return(policy(PPO("MlpPolicy", worlds, seed=1, device="cpu")))
-    (last,) = run.glob("BirthSIM*Circle-v1.zip")
+    (last,) = run.glob("BirthSIM*Circle-v2.zip")
     assert mean_return(policy(PPO.load(last, device="cpu"))) > untrained + 200, untrained
     (evaluations,) = run.rglob("evaluations.npz")
     assert np.load(evaluations)["results"].mean() > untrained

@@ -9,7 +9,7 @@ from ray.rllib.algorithms.algorithm import Algorithm
 from ray.rllib.algorithms.ppo import PPOConfig
 
 # The module before the colon registers the ids in processes of their own too.
-CIRCLE = "birthsim_env:BirthSIM/Circle-v1"
+CIRCLE = "birthsim_env:BirthSIM/Circle-v2"
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -14,8 +14,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecNorm
 from agents import SB3VecEnv
 
 # The module before the colon registers the ids in processes of their own too.
-PROBE = "birthsim_env:BirthSIM/Probe-v2"
-CIRCLE = "BirthSIM/Circle-v1"
+PROBE = "birthsim_env:BirthSIM/Probe-v3"
+CIRCLE = "BirthSIM/Circle-v2"
 DRAWN = {"randomize": True}
 
 

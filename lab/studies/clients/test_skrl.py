@@ -12,7 +12,7 @@ NETWORK = [{"name": "net", "input": "OBSERVATIONS", "layers": [64, 64], "activat
 
 
 def worlds(**arguments):
-    return wrap_env(gym.make_vec("BirthSIM/Circle-v1", num_envs=LANES, randomize=True, **arguments))
+    return wrap_env(gym.make_vec("BirthSIM/Circle-v2", num_envs=LANES, randomize=True, **arguments))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def acting(agent):
 
 
 def test_its_wrapper_shows_the_bare_lanes():
-    told, bare = worlds(), gym.make_vec("BirthSIM/Circle-v1", num_envs=LANES, randomize=True)
+    told, bare = worlds(), gym.make_vec("BirthSIM/Circle-v2", num_envs=LANES, randomize=True)
     # Its wrapper resets without a seed.
     told.unwrapped.reset(seed=3), bare.reset(seed=3)
     for action in np.random.default_rng(0).uniform(-0.3, 0.3, (20, LANES, 4)).astype(np.float32):

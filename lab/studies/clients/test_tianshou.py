@@ -12,7 +12,7 @@ from tianshou.highlevel.env import EnvFactoryRegistered, VectorEnvType
 from tianshou.highlevel.experiment import ExperimentConfig, PPOExperimentBuilder
 from tianshou.highlevel.params.algorithm_params import PPOParams
 
-NAME, STEPS = "birthsim_env:BirthSIM/Circle-v1", 100_000
+NAME, STEPS = "birthsim_env:BirthSIM/Circle-v2", 100_000
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def world(tmp_path):
 @pytest.mark.parametrize("kind", [DummyVectorEnv, SubprocVectorEnv])
 def test_its_vector_environments_give_the_bare_lanes(kind):
     told = kind([partial(gym.make, NAME, randomize=True)] * 2)
-    bare = gym.make_vec("BirthSIM/Circle-v1", num_envs=2, randomize=True)
+    bare = gym.make_vec("BirthSIM/Circle-v2", num_envs=2, randomize=True)
     # Tianshou resets with the seed at once, and again when it begins.
     told.seed([7, 8]), bare.reset(seed=7)
     np.testing.assert_array_equal(told.reset()[0], bare.reset()[0])

@@ -9,7 +9,7 @@ import torch
 from torchrl.envs import GymEnv, GymWrapper, ParallelEnv, SerialEnv, StepCounter, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
-NAME = "BirthSIM/Probe-v2"
+NAME = "BirthSIM/Probe-v3"
 
 
 def native(lanes, **arguments):

@@ -63,7 +63,7 @@ class Column:
         return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
 
 
-CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
+CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v2", "BirthSIM/Probe-v3", "BirthSIM/Forceps-v2"
 COLUMNS = (
     Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
     Column("the same, lab sensors, mm", CIRCLE, "lab", "randomised", "settled_rms"),

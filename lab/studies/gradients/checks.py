@@ -16,7 +16,7 @@ from lab.engine.tables import markdown
 from lab.studies.comparison.grid import default_controllers
 from lab.studies.gradients.loops import begun, compared
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 ENVIRONMENTS = tuple(environment_id(name) for name in studied_scenarios())
 
 CONTROLLERS = (*default_controllers(), f"{LIMITED}pid", f"{LIMITED}admittance-adaptive")

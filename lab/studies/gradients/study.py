@@ -67,7 +67,7 @@ def plant_cost(lanes: int, rig: bool) -> Result:
 def loop_cost(law: str) -> Result:
     """Of a policy step of a residual environment on ``law``, 256 lanes, one thread."""
     made: dict[str, Any] = {"num_envs": 256, "law": law, "randomize": True, "num_threads": 1}
-    plain, taped = list[Any](gymnasium.make_vec("BirthSIM/CircleResidual-v1", **made).unwrapped for _ in range(2))
+    plain, taped = list[Any](gymnasium.make_vec("BirthSIM/CircleResidual-v2", **made).unwrapped for _ in range(2))
     recorder, action, kept = Recorder(taped.simulation), np.zeros(taped.action_space.shape), dict[str, Any]()
     for env in (plain, taped):
         env.reset(seed=0)

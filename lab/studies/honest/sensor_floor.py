@@ -28,7 +28,7 @@ STATIC = ("force_gain_error", "force_crosstalk", "position_distortion", "distort
 """Errors that do not change in an episode and that no law can find."""
 
 HELD = 5.0
-"""s into ``BirthSIM/Probe-v2`` when the push is held."""
+"""s into ``BirthSIM/Probe-v3`` when the push is held."""
 
 STEP = 0.02
 """s between the instants of a circle that are looked at."""
@@ -38,9 +38,9 @@ STEPS = 12
 
 
 def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
-    """Of the worlds of ``BirthSIM/Probe-v2`` for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance from
+    """Of the worlds of ``BirthSIM/Probe-v3`` for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance from
     the compliant target while the push is held; (episodes,) each."""
-    env: Any = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=episodes, parameters=rig, sensors="honest", randomize=True)
+    env: Any = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=episodes, parameters=rig, sensors="honest", randomize=True)
     _, info = env.reset(seed=[seed + k for k in range(episodes)])
     target, stiffness = info["target"].T, info["stiffness_setpoint"].T
     env.simulation.run(round(HELD / env.simulation.period))
@@ -60,8 +60,8 @@ def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
 
 
 def circle_floor(rig: Parameters, episodes: int, seed: int) -> Array:
-    """Settled error of the worlds of ``BirthSIM/Circle-v1`` for ``rig``, mm, (episodes,)."""
-    env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=episodes, parameters=rig, sensors="honest", randomize=True)
+    """Settled error of the worlds of ``BirthSIM/Circle-v2`` for ``rig``, mm, (episodes,)."""
+    env: Any = gymnasium.make_vec("BirthSIM/Circle-v2", num_envs=episodes, parameters=rig, sensors="honest", randomize=True)
     env.reset(seed=[seed + k for k in range(episodes)])
     simulation, static = env.simulation, _static_sensors(rig, episodes, seed)
     hand, before = deepcopy(simulation.user_force), np.zeros((2, episodes))

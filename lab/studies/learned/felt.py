@@ -16,7 +16,7 @@ LANES, SEED = 32, 74_600_000
 """Randomised rigs, and the seed of the first. Those from 74300000 on guided the training of ``probe_apg``."""
 
 COLUMNS = {"stiffness_error": "static stiffness error, %", "noticed": "JND at 1 Hz", "energy": "energy given, mJ"}
-"""Figure -> its column: sizes in ``Probe-v2``; of ``lab.studies.shaken``."""
+"""Figure -> its column: sizes in ``Probe-v3``; of ``lab.studies.shaken``."""
 
 
 def measure(controller: str, source: str, rig: dict[str, Any], sensors: str, **options: Any) -> Result:
@@ -24,7 +24,7 @@ def measure(controller: str, source: str, rig: dict[str, Any], sensors: str, **o
     believed = Parameters.from_dict(rig)
     world: dict[str, Any] = {"sensors": sensors, "randomize": True, "parameters": believed}
     probe = evaluate(
-        "BirthSIM/Probe-v2", make_controller(controller, believed, **options), controller, LANES, SEED, progress=False, **world
+        "BirthSIM/Probe-v3", make_controller(controller, believed, **options), controller, LANES, SEED, progress=False, **world
     )
     rigs = Condition(controller, believed, sensors, SEED, LANES, True).drawn()
     found = shaken(make_controller(controller, believed, **options), rigs, sensors, SEED)

@@ -36,27 +36,27 @@ class Run(NamedTuple):
 
 
 RUNS = {
-    "circle": Run("BirthSIM/Circle-v1", 256, 20000),
-    "probe": Run("BirthSIM/Probe-v2", 128, 20000),
-    "descent": Run("BirthSIM/Descent-v1", 64, 20000),
-    "forceps": Run("BirthSIM/Forceps-v1", 128, 20000),
-    "dystocia": Run("BirthSIM/Dystocia-v1", 128, 20000),
-    "circle_lab": Run("BirthSIM/Circle-v1", 256, 20000, ("admittance-backstepping",), "lab"),
-    "circle_pure": Run("BirthSIM/Circle-v1", 64, 20000, ("backstepping",)),
+    "circle": Run("BirthSIM/Circle-v2", 256, 20000),
+    "probe": Run("BirthSIM/Probe-v3", 128, 20000),
+    "descent": Run("BirthSIM/Descent-v2", 64, 20000),
+    "forceps": Run("BirthSIM/Forceps-v2", 128, 20000),
+    "dystocia": Run("BirthSIM/Dystocia-v2", 128, 20000),
+    "circle_lab": Run("BirthSIM/Circle-v2", 256, 20000, ("admittance-backstepping",), "lab"),
+    "circle_pure": Run("BirthSIM/Circle-v2", 64, 20000, ("backstepping",)),
     "circle_honest_student": Run(
-        "BirthSIM/Circle-v1", 128, 170000, ("admittance-sensorless", "backstepping-force-first"), "honest",
+        "BirthSIM/Circle-v2", 128, 170000, ("admittance-sensorless", "backstepping-force-first"), "honest",
         "examples/honest_sensors_rig.toml",
     ),
     **{
         f"{name}_apg": Run(environment, episodes, 74_800_000, ("backstepping", "admittance-backstepping"))
         for name, environment, episodes in (
-            ("circle", "BirthSIM/Circle-v1", 256), ("probe", "BirthSIM/Probe-v2", 128), ("descent", "BirthSIM/Descent-v1", 64),
-            ("forceps", "BirthSIM/Forceps-v1", 128), ("dystocia", "BirthSIM/Dystocia-v1", 128),
-            ("vacuum", "BirthSIM/Vacuum-v0", 128),
+            ("circle", "BirthSIM/Circle-v2", 256), ("probe", "BirthSIM/Probe-v3", 128), ("descent", "BirthSIM/Descent-v2", 64),
+            ("forceps", "BirthSIM/Forceps-v2", 128), ("dystocia", "BirthSIM/Dystocia-v2", 128),
+            ("vacuum", "BirthSIM/Vacuum-v1", 128),
         )
     },
-    "circle_residual_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000),
-    "circle_lab_apg": Run("BirthSIM/Circle-v1", 256, 74_800_000, ("admittance-backstepping", "admittance-adaptive"), "lab"),
+    "circle_residual_apg": Run("BirthSIM/Circle-v2", 256, 74_800_000),
+    "circle_lab_apg": Run("BirthSIM/Circle-v2", 256, 74_800_000, ("admittance-backstepping", "admittance-adaptive"), "lab"),
 }  # fmt: skip
 """Policy -> its run; seeds were never used for training or design."""
 

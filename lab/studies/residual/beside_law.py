@@ -32,7 +32,7 @@ from lab.studies.haptics.worlds import Condition
 
 ERRORS = {"error": "settled error, mm", "stiffness": "error along the push, %"}
 STATIC = "static stiffness error, %: median", "95 %"
-PUSHED = "BirthSIM/Probe-v2"
+PUSHED = "BirthSIM/Probe-v3"
 """Where the static stiffness is measured."""
 
 FELT = {"bandwidth": "bandwidth, Hz: mean", "jnd": "JND at 1 Hz: median", "error": "own error, mm: median"}

@@ -30,7 +30,7 @@ HANDS = ("steps", "sine", "noise", "guided")
 PARTS = (0.5, 0.95, 1.0)
 """Median, 95th percentile and worst."""
 
-STATIC = "BirthSIM/Probe-v2"
+STATIC = "BirthSIM/Probe-v3"
 
 STEADY, FLOOR = BOUNDS = ("its sensors without noise, delays and bias", "no controller has less")
 """The controller where sensors err by scale, distortion, gain and crosstalk alone; and what those leave to any controller."""

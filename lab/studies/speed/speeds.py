@@ -28,7 +28,7 @@ ROUNDS = 3
 HERE = Path(birthsim_env.__file__).resolve().parent.parent
 """The checkout, or the folder of packages, that this module belongs to."""
 
-CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
+CIRCLE, RESIDUAL = "BirthSIM/Circle-v2", "BirthSIM/CircleResidual-v2"
 
 
 @dataclass(frozen=True)

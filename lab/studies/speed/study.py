@@ -127,7 +127,7 @@ def _control(name: str, sensors: str, lanes: int, budget: float) -> float:
     rig = birthsim_env.Parameters()
     law = make_controller(name, rig)
     env: Any = gymnasium.make_vec(
-        "BirthSIM/Circle-v1",
+        "BirthSIM/Circle-v2",
         num_envs=lanes,
         policy_period=rig.electronics.control_period,
         sensors=sensors,
@@ -169,7 +169,7 @@ def here(seconds: float) -> Result:
     packed, scalar = packed_fraction()
     numba_speed, c_speed = _against_c(256, budget)
     single, reference = 1 / step(speed.CIRCLE, budget), _scipy(budget)
-    ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)
+    ours, theirs = _frames("BirthSIM/Circle-v2", budget), _frames("CartPole-v1", budget)
     rows: list[Row] = [
         ("plant, 1024 lanes", kernel, "policy steps/s (10 ms = 30 Runge-Kutta steps)"),
         ("per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),

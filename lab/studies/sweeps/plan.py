@@ -20,7 +20,7 @@ from birthsim_env.physics.rig.reading import named, read_toml
 from birthsim_env.physics.rig.values import is_within, shown
 from lab.studies.sweeps.names import FIXED, NAMES, check_name, check_together, check_value
 
-DEFAULTS = {"environment": "BirthSIM/Circle-v1", "controller": "backstepping", "sensors": "ideal", "randomize": True}
+DEFAULTS = {"environment": "BirthSIM/Circle-v2", "controller": "backstepping", "sensors": "ideal", "randomize": True}
 
 MOST_POINTS = 1_000_000
 """Of a sweep, assumed: more is a mistyped number."""

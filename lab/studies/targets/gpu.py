@@ -21,10 +21,10 @@ from birthsim_build.device.machine import machine_named
 from lab.engine.tables import markdown
 
 LOOPS: dict[str, tuple[str, dict[str, Any]]] = {
-    "Circle, ideal": ("BirthSIM/Circle-v1", {}),
-    "Circle, honest": ("BirthSIM/Circle-v1", {"sensors": "honest"}),
-    "Circle residual, lab": ("BirthSIM/CircleResidual-v1", {"sensors": "lab"}),
-    "Descent, ideal": ("BirthSIM/Descent-v1", {}),
+    "Circle, ideal": ("BirthSIM/Circle-v2", {}),
+    "Circle, honest": ("BirthSIM/Circle-v2", {"sensors": "honest"}),
+    "Circle residual, lab": ("BirthSIM/CircleResidual-v2", {"sensors": "lab"}),
+    "Descent, ideal": ("BirthSIM/Descent-v2", {}),
 }
 NATIVE_LANES = 256
 MOST_TAPES = 1 << 18

@@ -30,7 +30,7 @@ from birthsim_env.loop.world import Start
 from lab.studies.targets.gpu import Clock, stepping
 
 FEW, STEPS, TURNS = 64, 40, 3
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 
 
 def bits(device: str, lanes: int) -> str:

@@ -28,7 +28,7 @@ def files(tmp_path_factory):
     write_recording(folder / "one.rec", example(40, second=True))
     results = []
     for name in ("pid", "backstepping"):
-        task = pieces.evaluation_tasks(name, pieces.controller_settings(name, rig), "BirthSIM/Probe-v2", {}, 2, 7)[0]
+        task = pieces.evaluation_tasks(name, pieces.controller_settings(name, rig), "BirthSIM/Probe-v3", {}, 2, 7)[0]
         result = task.work(**task.settings)
         tasks._write(folder / f"{name}.json", task, result, {})
         results.append(pieces.gathered(name, [result]).to_dict())

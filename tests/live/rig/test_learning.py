@@ -64,7 +64,7 @@ def test_gradients_are_those_of_training(page, horizon, steps):
     """With 40 steps the last of eight lanes, which begin staggered, ends with the fifth step."""
     env = worlds(COUNT)
     env.steps = steps
-    settings = TrainingSettings(environment="BirthSIM/CircleResidual-v1", rollout=horizon, discount=1.0)
+    settings = TrainingSettings(environment="BirthSIM/CircleResidual-v2", rollout=horizon, discount=1.0)
     lanes = Lanes(settings, env, [TRAINING_SEED + lane for lane in range(COUNT)])
     about = node(page, BEGUN + "console.log(JSON.stringify(about));", {})
     torch.manual_seed(0)  # no weight is zero

@@ -32,6 +32,6 @@ def test_a_controller_that_expects_no_friction_holds_such_a_head_still():
     }
     frictionless = replace(rig, **free)
     law = make_controller("backstepping", frictionless)
-    found = evaluate("BirthSIM/Probe-v2", law, "backstepping", 1, 0, progress=False, parameters=frictionless)
+    found = evaluate("BirthSIM/Probe-v3", law, "backstepping", 1, 0, progress=False, parameters=frictionless)
     assert found.metrics["hunting_x"][0] < 0.1
     assert found.metrics["settled_rms"][0] < 0.5

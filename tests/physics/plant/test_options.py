@@ -16,7 +16,7 @@ from lab.studies.accuracy import second_model
 from lab.studies.accuracy.motions import PERIOD, strong
 from lab.studies.accuracy.second_model import SCALES, SecondModel
 
-CIRCLE = "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v2"
 LINE = {"air.supply_conductance": 4e-9, "air.supply_volume": 1e-4}
 TUBE = {"chambers.tube_length": 1.0}
 HANDLE = {"mechanics.mode_frequency": 25.0, "mechanics.mode_damping": 0.05, "mechanics.mode_mass_fraction": 0.3}

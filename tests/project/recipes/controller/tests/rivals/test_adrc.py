@@ -12,7 +12,7 @@ RIG = Parameters()
 
 def settled(name: str, **options: float) -> float:
     law = make_controller(name, RIG, **options)
-    found = evaluate("BirthSIM/Circle-v1", law, name, 4, 0, progress=False, randomize=True, duration=3.0)
+    found = evaluate("BirthSIM/Circle-v2", law, name, 4, 0, progress=False, randomize=True, duration=3.0)
     assert not any(found.lost)
     return float(np.median(found.metrics["settled_rms"]))
 

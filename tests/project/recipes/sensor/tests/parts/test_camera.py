@@ -7,7 +7,7 @@ from birthsim_env.parts.sensors.camera import PIXEL
 
 
 def test_positions_are_whole_pixels_and_near_the_true_ones():
-    env = gymnasium.make("BirthSIM/Circle-v1", sensors="camera").unwrapped
+    env = gymnasium.make("BirthSIM/Circle-v2", sensors="camera").unwrapped
     env.reset(seed=0)
     for _ in range(50):
         env.step(np.zeros(4, np.float32))

@@ -19,7 +19,7 @@ SENSORS = ("ideal", "lab")
 def error(controller: str, sensors: str, episodes: int, seed: int) -> Result:
     """One piece: the settled error, mm, median over ``episodes``."""
     own = make_controller(controller, Parameters())
-    found = evaluate("BirthSIM/Circle-v1", own, controller, episodes, seed, progress=False, sensors=sensors)
+    found = evaluate("BirthSIM/Circle-v2", own, controller, episodes, seed, progress=False, sensors=sensors)
     return {"settled_rms": quantile(found.metrics["settled_rms"], 0.5)}
 
 
