@@ -58,8 +58,8 @@ HELD = {"lugre": STEP.relaxation_limit, "elasto_plastic": STEP.elasto_plastic_li
 
 CASES = {
     # Position (m) and pressure (relative), about twice what was measured. Where a spool leaves its overlap the flow has a
-    # corner, which costs a step accuracy: linear valves come up to six times nearer in the strong motion. The corners of sign(v)
-    # in (4) cost more.
+    # corner, which costs a step accuracy: linear valves come up to six times nearer in the strong motion. The corners of
+    # sign(v) in (4) cost more.
     "default, stick-slip": ({}, stick_slip, (2.3e-6, 9e-6)),
     "default, strong": ({}, strong, (1.2e-6, 7e-6)),
     "other rig, stick-slip": (OTHER, stick_slip, (1.5e-6, 1e-5)),
