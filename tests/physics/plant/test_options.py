@@ -255,7 +255,7 @@ SIZES = {
     **{(0.02, 0.004): 800.0, (0.5, 0.001): 17.0, (0.5, 0.0025): 50.0, (1.0, 0.004): 53.0},
     **{(3.0, 0.006): 37.0, (0.2, 0.02): 1750.0, (10.0, 0.02): 1.5, (0.05, 0.001): 40.0},
 }
-"""Length and bore of tubes, m, and Pa, about twice what was measured: with linear valves half as much in the widest short one."""
+"""Length and bore of tubes, m, and Pa, about twice what was measured; linear valves halve what is the most of them."""
 
 
 @pytest.mark.parametrize(("length", "bore"), SIZES)
