@@ -36,7 +36,7 @@ def test_a_part_alone_differs_from_the_default_rig_in_the_other_parts(part):
 def test_the_table_has_a_row_for_every_rig():
     tasks = measured_rig.STUDY.tasks(OPTIONS)
     assert [rig for rig, _, _ in tasks] == list(EXCHANGED)
-    figures = measured_rig.STUDY.keep(OPTIONS, dict.fromkeys(tasks, {name: [1.5, 2.5] for name in measured_rig.COLUMNS}))
+    figures = measured_rig.STUDY.keep(OPTIONS, {key: {name: [1.5, 2.5] for name in measured_rig.COLUMNS} for key in tasks})
     text = measured_rig.STUDY.show({"figures": figures, "settings": vars(OPTIONS)})["measured-rig.md"]
     assert text.count("1.5 / 2.5 | 1.5 / 2.5 | 1.5 / 2.5 |") == len(EXCHANGED)
 
