@@ -8,6 +8,7 @@ from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.physics.compiled.lanes import FC1, MASS
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
+from birthsim_env.physics.rig.parameters import DECLARED
 from birthsim_env.physics.strength import carried
 from tests.oracles import rigid_body
 
@@ -48,7 +49,8 @@ def test_what_is_drawn_is_said():
     words = described(Parameters().replace({"mechanics.mass": 9.0}), True)
     assert words.startswith("rigs drawn: ")
     assert "mass 7.2 to 10.8 kg" in words
-    assert "coulomb friction of cylinder1 3 to 21 N" in words
+    low, high = DECLARED["cylinder1.coulomb_friction"].range
+    assert f"coulomb friction of cylinder1 {low} to {high} N" in words
     assert described(Parameters(), False) == described(Parameters(), "scenario") == "the rig as described"
     assert described(Parameters(), {"mechanics.mass": (2, 3)}) == "rigs drawn: mass 2 to 3 kg"
 
