@@ -157,5 +157,12 @@ def _one_drawn(name: str, low: float, high: float, rng: Any) -> Any:
         return rng.uniform(low, high)
     share = rng.uniform()
     octaves = exact.number("log2", high / low)
-    powers = [exact.number("exp", octaves * one / exact.LOG2_E) for one in np.ravel(share)]
-    return np.minimum(low * np.reshape(powers, np.shape(share)), high)[()]
+    powers = np.empty_like(share)
+    for lane, one in np.ndenumerate(share):
+        powers[lane] = _exp(octaves * one / exact.LOG2_E)
+    return np.minimum(low * powers, high)[()]
+
+
+def _exp(x: Any) -> Any:
+    """e^x, of a number, or of a symbol where the code that draws on a device is made."""
+    return exact.number("exp", x) if isinstance(x, float) else x.graph.node("exp", x)
