@@ -19,9 +19,9 @@ RANGES = documented_ranges(RIG)
 
 @pytest.mark.slow
 def test_the_found_world_is_worse_than_all_drawn_ones_and_comes_again_in_every_bit():
-    found = worst.worst("admittance-adaptive", "ideal", RIG.to_dict(), "stiffness_error", 15.0, 3.0, episodes=8, seed=SEED)
+    found = worst.worst("admittance-adaptive", "ideal", RIG.to_dict(), "stiffness_error", 15.0, 3.0, episodes=32, seed=SEED)
     law = make_controller("admittance-adaptive", RIG)
-    done = evaluate("BirthSIM/Probe-v3", law, "law", 8, SEED, False, randomize=True)
+    done = evaluate("BirthSIM/Probe-v3", law, "law", 32, SEED, False, randomize=True)
     sizes = np.abs(done.metrics["stiffness_error"])
     assert found["named"][0] == [SEED + int(np.argmax(sizes)), done.metrics["stiffness_error"][int(np.argmax(sizes))]]
     world = found["found"]
