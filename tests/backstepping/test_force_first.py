@@ -10,9 +10,12 @@ from baselines.valve_inverse import CylinderAir, force_first_openings, two_valve
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law
+from tests.oracles.closed_loop import AT_ONCE
 
-RIG = Parameters()
+RIG = Parameters().replace(AT_ONCE)
 LENGTH = RIG.cylinder2.stroke
+FULL = 1 - 1e-9
+"""The inverse of the curve comes this near to full stroke where a valve saturates."""
 
 
 def openings(cases: Array, rig: Parameters = RIG) -> tuple[Array, Array]:
@@ -81,7 +84,7 @@ def test_without_saturation_both_rates_are_had(changes: dict[str, float]) -> Non
     """The same openings as without an order of precedence, and exactly the wanted rates."""
     cases, rig = drawn(500, 1000.0, seed=0), RIG.replace(changes)
     first, neither = openings(cases, rig)
-    inside = np.abs(neither).max(axis=0) < 1
+    inside = np.abs(neither).max(axis=0) < FULL
     assert inside.sum() > 150
     np.testing.assert_allclose(first[:, inside], neither[:, inside], rtol=0, atol=1e-12)
     for case, opening in zip(cases.T[inside], first.T[inside], strict=True):
@@ -93,7 +96,7 @@ def test_where_a_valve_saturates_the_force_has_precedence(rates: float) -> None:
     """Lexicographic optimum: no valves give a nearer dF/dt, and with that none a nearer pressurisation."""
     cases = drawn(90, rates, seed=1)
     first, neither = openings(cases)
-    saturated, kept = np.abs(neither).max(axis=0) >= 1, 0
+    saturated, kept = np.abs(neither).max(axis=0) >= FULL, 0
     assert saturated.sum() > 40
     for case, opening, plain in zip(cases.T[saturated], first.T[saturated], neither.T[saturated], strict=True):
         assert_nearest(case, opening)
@@ -123,6 +126,6 @@ def survived(name: str, world: int) -> float:
 
 
 def test_a_push_that_empties_both_chambers_under_the_papers_law_is_held() -> None:
-    """4 kg where 3 are believed, a hand pulls with 35 N at 1102 N/m: found among random circles."""
-    assert 9.0 < survived("backstepping", 120061) < 10.5
-    assert survived("backstepping-force-first", 120061) == np.inf
+    """3.4 kg where 3 are believed, a hand pulls with 39 N at 1269 N/m: the one of 2048 random circles that is lost."""
+    assert 7.0 < survived("backstepping", 118) < 8.0
+    assert survived("backstepping-force-first", 118) == np.inf
