@@ -123,6 +123,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     in [-1, 1] of the right shape.
 
     ## Version history
+    - Circle, Descent, Forceps, Dystocia v2, Probe v3, Vacuum v1: the catalogue's valves, friction that grows with pressure,
+      bristles of any stiffness; other worlds are drawn. The ids before are refused.
     - Probe v2: the push begins after 3 s instead of 1 s, when the head is at rest, and the episode lasts 7 s instead of 5 s.
     - v1: the reward is never negative; a circle starts without preloaded friction.
     - v0: first version.

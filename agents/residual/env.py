@@ -59,6 +59,7 @@ class ResidualEnv(_InnerController, BirthSIMEnv):
     gets the hand's force. It is then a part of the unexplained forces.
 
     ## Version history
+    - v2 and v3: as `BirthSIMEnv`.
     - v1: as `BirthSIMEnv` v1.
     - v0: first version.
     """

@@ -43,13 +43,14 @@ class TrainingSettings:
     """An experiment and its algorithm.
 
     PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes; the analytic
-    policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount``, and it alone takes another
-    ``target`` than the spring, and worlds ``beside`` those of ``environment``, which share the lanes evenly: each an id, and
-    after a space the name of a hand where it is not the scenario's. The learning rate falls linearly to a hundredth. The
-    training ends early once the pooled settled error of its policy in validation is ``until`` percent below that of the
-    paper's law; with 100 it never ends early. Training draws rigs that oscillate more easily than those of validation, by a
-    ``margin`` (``agents.training.margin``). A ``privileged`` policy observes the true parameters of the rig
-    (``agents.residual.privileged``), and runs in no controller.
+    policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount``. It alone takes another ``target``
+    than the spring, and worlds ``beside`` those of ``environment``, which share the lanes evenly: each an id, and after a space
+    the name of a hand where it is not the scenario's. It alone adds ``noise`` to actions, a normal one whose standard deviation
+    falls linearly to zero: within the overlap of valves a policy that drives them has no gradient without it. The learning rate
+    falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
+    ``until`` percent below that of the paper's law; with 100 it never ends early. Training draws rigs that oscillate more
+    easily than those of validation, by a ``margin`` (``agents.training.margin``). A ``privileged`` policy observes the true
+    parameters of the rig (``agents.residual.privileged``), and runs in no controller.
     Raises ``ValueError`` naming what cannot be.
     """
 
@@ -76,6 +77,7 @@ class TrainingSettings:
     target: str = "spring"
     beside: tuple[str, ...] = ()
     margin: float = 0.0
+    noise: float = 0.0
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -96,7 +98,8 @@ class TrainingSettings:
         ):
             checked_number(name, getattr(self, name), unit, above=low, most=high)
         checked_number("log_std", self.log_std, "-", least=-20.0, most=2.0)
-        checked_number("margin", self.margin, "-", least=0.0, most=1.0)
+        for name in ("margin", "noise"):
+            checked_number(name, getattr(self, name), "-", least=0.0, most=1.0)
         make_plain(self)
         widths = [whole_of(width) or 0 for width in self.hidden] if isinstance(self.hidden, tuple) else []
         if not (all(1 <= width <= WIDEST for width in widths) and 1 <= len(widths) <= LAYERS):
@@ -104,7 +107,7 @@ class TrainingSettings:
         object.__setattr__(self, "hidden", tuple(widths))
         if not (isinstance(self.beside, tuple) and all(isinstance(one, str) for one in self.beside)):
             raise ValueError(f"beside = {shown(self.beside)}; allowed: ids of residual environments, with hands after a space")
-        for name, plain in (("target", TARGETS[0]), ("beside", ())):
+        for name, plain in (("target", TARGETS[0]), ("beside", ()), ("noise", 0.0)):
             if self.algorithm != "apg" and getattr(self, name) != plain:
                 raise ValueError(
                     f"{name} = {shown(getattr(self, name))} with algorithm = {self.algorithm!r}; allowed: {plain!r}"

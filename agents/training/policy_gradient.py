@@ -75,6 +75,7 @@ class PolicyGradient:
         seed = TRAINING_SEED + SEED_SPACING * settings.seed
         firsts = [seed + sum(counts[:k]) for k in range(len(counts))]
         self._mean, self._variance = _statistics(envs, firsts)
+        self._noise: np.random.Generator | None = None
         self._groups = [
             Lanes(settings, one, [first + lane for lane in range(count)])
             for one, first, count in zip(envs, firsts, counts, strict=True)
@@ -136,6 +137,7 @@ class PolicyGradient:
     def _update(self) -> None:
         """One horizon forward and back in every group of lanes."""
         settings = self._settings
+        self._noise = np.random.default_rng((settings.seed, self.steps)) if settings.noise else None
         self._adam.zero_grad()
         for group in self._groups:
             (group.cost(self._act) / len(self._groups)).backward()  # type: ignore[no-untyped-call]
@@ -160,10 +162,18 @@ class PolicyGradient:
             group.begin(lanes)
 
     def _act(self, observation: Tensor) -> Tensor:
-        """Actions (N, size) for observations (N, D), which are normalised as by ``PolicyNetwork``."""
-        mean, deviation = torch.from_numpy(self._mean), torch.from_numpy(np.sqrt(self._variance + EPSILON))
-        actions: Tensor = self._policy(((observation - mean) / deviation).clamp(-CLIP, CLIP).float())
-        return actions
+        """Actions (N, size), with noise, for observations (N, D), which are normalised as by ``PolicyNetwork``.
+
+        A spool within its overlap lets nothing through, so that a policy that begins with zeros would have no gradient. The
+        mean over noise has one everywhere (randomised smoothing).
+        """
+        mean, spread = torch.from_numpy(self._mean), torch.from_numpy(np.sqrt(self._variance + EPSILON))
+        actions: Tensor = self._policy(((observation - mean) / spread).clamp(-CLIP, CLIP).float())
+        if self._noise is None:
+            return actions
+        drawn = self._noise.standard_normal(actions.shape, dtype=np.float32)
+        deviation = self._settings.noise * max(0.0, 1.0 - self.steps / self._settings.steps)
+        return (actions + deviation * torch.from_numpy(drawn)).clamp(-1.0, 1.0)
 
     def network(self) -> PolicyNetwork:
         """The policy as plain arrays, a copy."""

@@ -61,7 +61,7 @@ class Cylinder(Section):
         source="assumed: with pressure_friction at mid pressures 12 N, 4-5 % of the rated force",
         least=0,
         most=1e5,
-        range=(3, 21),
+        range=(4, 18),
         identified=Prior(0.7),
         row="fc",
     )

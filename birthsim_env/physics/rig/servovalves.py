@@ -41,6 +41,49 @@ TOLERATED = Curve(*((0.9 * value, 1.1 * value) for value in MPYE_5_M5))
 CURVE = "catalogue of the paper's MPYE-5-M5-010-B, within 10 %"
 
 
+def _overlap(side: str) -> Any:
+    return parameter(
+        "-",
+        f"overlap d of the edge to the {side}: opening of the spool up to which it stays shut",
+        default=MPYE_5_M5.overlap,
+        source=CURVE,
+        least=0,
+        most=0.5,
+        range=TOLERATED.overlap,
+        identified=Prior(5.0, scale=0.01),
+        row=None,
+    )
+
+
+def _curvature(side: str) -> Any:
+    return parameter(
+        "-",
+        f"curvature c of the edge to the {side}: how much steeper than on average its flow rises beyond the overlap",
+        default=MPYE_5_M5.curvature,
+        source=CURVE,
+        least=-0.8,
+        most=0.8,
+        range=TOLERATED.curvature,
+        identified=Prior(2.5, scale=0.1),
+        row=None,
+    )
+
+
+def _more(of: str, most: float, drawn: float) -> Any:
+    return parameter(
+        "-",
+        f"more {of}",
+        default=0.0,
+        source="assumed",
+        least=-most,
+        most=most,
+        option=True,
+        range=(-drawn, drawn),
+        on_request=True,
+        row=None,
+    )
+
+
 @dataclass(frozen=True)
 class Valves(Section):
     """Proportional servovalve: ISO 6358 orifices behind a spool with a first-order lag."""
@@ -86,50 +129,10 @@ class Valves(Section):
         identified=Prior(0.7),
         row="tau",
     )
-    supply_overlap: float = parameter(
-        "-",
-        "overlap d of the edge to the supply: opening of the spool up to which it stays shut",
-        default=MPYE_5_M5.overlap,
-        source=CURVE,
-        least=0,
-        most=0.5,
-        range=TOLERATED.overlap,
-        identified=Prior(5.0, scale=0.01),
-        row=None,
-    )
-    supply_curvature: float = parameter(
-        "-",
-        "curvature c of the edge to the supply: how much steeper than on average its flow rises beyond the overlap",
-        default=MPYE_5_M5.curvature,
-        source=CURVE,
-        least=-0.8,
-        most=0.8,
-        range=TOLERATED.curvature,
-        identified=Prior(2.5, scale=0.1),
-        row=None,
-    )
-    exhaust_overlap: float = parameter(
-        "-",
-        "overlap of the edge to the exhaust",
-        default=MPYE_5_M5.overlap,
-        source=CURVE,
-        least=0,
-        most=0.5,
-        range=TOLERATED.overlap,
-        identified=Prior(5.0, scale=0.01),
-        row=None,
-    )
-    exhaust_curvature: float = parameter(
-        "-",
-        "curvature of the edge to the exhaust",
-        default=MPYE_5_M5.curvature,
-        source=CURVE,
-        least=-0.8,
-        most=0.8,
-        range=TOLERATED.curvature,
-        identified=Prior(2.5, scale=0.1),
-        row=None,
-    )
+    supply_overlap: float = _overlap("supply")
+    supply_curvature: float = _curvature("supply")
+    exhaust_overlap: float = _overlap("exhaust")
+    exhaust_curvature: float = _curvature("exhaust")
     exhaust_ratio: float = parameter(
         "-",
         "conductance of the fully open edge to the exhaust over that to the supply",
@@ -185,78 +188,12 @@ class Valves(Section):
 class Valve(Section):
     """What one valve, of the chamber that its section names, has more than all four share."""
 
-    supply_overlap: float = parameter(
-        "-",
-        "more overlap of the edge to the supply; one that comes below 0 is 0",
-        default=0.0,
-        source="assumed",
-        least=-0.3,
-        most=0.3,
-        option=True,
-        range=(-0.02, 0.02),
-        on_request=True,
-        row=None,
-    )
-    supply_curvature: float = parameter(
-        "-",
-        "more curvature of the edge to the supply; one that comes beyond 0.95 is 0.95",
-        default=0.0,
-        source="assumed",
-        least=-0.8,
-        most=0.8,
-        option=True,
-        range=(-0.04, 0.04),
-        on_request=True,
-        row=None,
-    )
-    supply_conductance: float = parameter(
-        "-",
-        "more conductance of the edge to the supply, as a part of it",
-        default=0.0,
-        source="assumed",
-        least=-0.5,
-        most=0.5,
-        option=True,
-        range=(-0.1, 0.1),
-        on_request=True,
-        row=None,
-    )
-    exhaust_overlap: float = parameter(
-        "-",
-        "more overlap of the edge to the exhaust; one that comes below 0 is 0",
-        default=0.0,
-        source="assumed",
-        least=-0.3,
-        most=0.3,
-        option=True,
-        range=(-0.02, 0.02),
-        on_request=True,
-        row=None,
-    )
-    exhaust_curvature: float = parameter(
-        "-",
-        "more curvature of the edge to the exhaust; one that comes beyond 0.95 is 0.95",
-        default=0.0,
-        source="assumed",
-        least=-0.8,
-        most=0.8,
-        option=True,
-        range=(-0.04, 0.04),
-        on_request=True,
-        row=None,
-    )
-    exhaust_conductance: float = parameter(
-        "-",
-        "more conductance of the edge to the exhaust, as a part of it",
-        default=0.0,
-        source="assumed",
-        least=-0.5,
-        most=0.5,
-        option=True,
-        range=(-0.1, 0.1),
-        on_request=True,
-        row=None,
-    )
+    supply_overlap: float = _more("overlap of the edge to the supply; one that comes below 0 is 0", 0.3, 0.02)
+    supply_curvature: float = _more("curvature of the edge to the supply; one that comes beyond 0.95 is 0.95", 0.8, 0.04)
+    supply_conductance: float = _more("conductance of the edge to the supply, as a part of it", 0.5, 0.1)
+    exhaust_overlap: float = _more("overlap of the edge to the exhaust; one that comes below 0 is 0", 0.3, 0.02)
+    exhaust_curvature: float = _more("curvature of the edge to the exhaust; one that comes beyond 0.95 is 0.95", 0.8, 0.04)
+    exhaust_conductance: float = _more("conductance of the edge to the exhaust, as a part of it", 0.5, 0.1)
 
 
 MOST_CURVED = 0.95
