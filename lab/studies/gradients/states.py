@@ -18,7 +18,7 @@ def plant_of(lanes: int, seed: int) -> tuple[Plant, Array, Array]:
     rng, nominal, plant = np.random.default_rng(seed), load_parameters(None), Plant(None, lanes)
 
     class Streams:
-        uniform = staticmethod(lambda low, high: rng.uniform(low, high, lanes))
+        uniform = staticmethod(lambda low=0.0, high=1.0: rng.uniform(low, high, lanes))
 
     plant.lane_parameters[:] = draw_columns(nominal, documented_ranges(nominal), Streams, lanes)  # type: ignore[arg-type]
     state = balanced_state(plant.lane_parameters, rng.uniform([[-0.08], [-0.15]], [[0.08], [0.15]], (2, lanes)))
