@@ -28,7 +28,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import theta1
 from birthsim_env.physics.rig.parameters import Parameters
 
-FRICTIONLESS = {f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)}
+FRICTIONLESS = {f"cylinder{i}.{name}": 0.0 for i in (1, 2) for name in ("coulomb_friction", "pressure_friction")}
 """Changes of a rig that take its dry friction away."""
 
 PLACES, MASSES = 128, (2.0, 5.0)

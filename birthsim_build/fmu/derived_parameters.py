@@ -11,6 +11,7 @@ STAYS = "geometry"
 """The section whose numbers stay as they were built: the law and the target know the linkage too."""
 
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/", "greater": ">"}
+_CHOOSING = {"maximum": ">", "minimum": "<"}
 
 
 class Expression(np.lib.mixins.NDArrayOperatorsMixin):
@@ -23,8 +24,8 @@ class Expression(np.lib.mixins.NDArrayOperatorsMixin):
         terms = [_text(term) for term in inputs]
         if ufunc.__name__ in _INFIX:
             return Expression(f"({terms[0]} {_INFIX[ufunc.__name__]} {terms[1]})")
-        if ufunc is np.maximum:
-            return Expression(f"({terms[0]} > {terms[1]} ? {terms[0]} : {terms[1]})")
+        if ufunc.__name__ in _CHOOSING:
+            return Expression(f"({terms[0]} {_CHOOSING[ufunc.__name__]} {terms[1]} ? {terms[0]} : {terms[1]})")
         if ufunc is np.sqrt:
             return Expression(f"sqrt({terms[0]})")
         return NotImplemented  # type: ignore[no-any-return]

@@ -47,7 +47,7 @@ def _of_graph(operation: str) -> Callable[..., Any]:
     return made
 
 
-_NUMPY = {"max": "maximum", "min": "minimum", "sqrt": "sqrt"}
+_NUMPY = {"max": "maximum", "min": "minimum", "sqrt": "sqrt", "floor": "floor"}
 
 _UFUNCS: dict[Any, Callable[..., Any]] = {
     np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul, np.divide: operator.truediv,

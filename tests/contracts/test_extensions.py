@@ -53,7 +53,7 @@ def test_a_controller_drives_an_environment():
     env.reset(seed=0)
     for _ in range(200):
         wanted, seen = env.reference.position, env.measurement.position
-        along, up = np.clip(6.0 * (wanted - seen), -1, 1)
+        along, up = np.clip(10.0 * (wanted - seen), -1, 1)
         env.step(np.zeros(0, np.float32))
         np.testing.assert_array_equal(env.simulation.openings[:, 0], (-up, up, along, -along))
     assert len(env.simulation._loop._pieces) == 1, "all of it is compiled"

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from birthsim_env.parts.scenarios import environment_id
 from lab.studies import leaderboard
 
 
@@ -33,9 +34,10 @@ def test_what_breaks_a_rule_is_named(tmp_path):
 
 
 def changed(folder, **arguments):
-    """An entry in a folder of its own, with other arguments."""
+    """An entry in a folder of its own, of the environment as it is now, with other arguments."""
     said = json.loads((leaderboard.ENTRIES / "pid.json").read_text())
-    (folder / "own.json").write_text(json.dumps({**said, "arguments": said["arguments"] | arguments}))
+    given = said["arguments"] | {"env": environment_id("circle")} | arguments
+    (folder / "own.json").write_text(json.dumps({**said, "arguments": given}))
     return folder / "own.json"
 
 

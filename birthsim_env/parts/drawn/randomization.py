@@ -123,7 +123,7 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
 
 def draw_parameters(nominal: Parameters, ranges: Ranges, rng: np.random.Generator) -> Parameters:
     """``nominal`` with every field in ``ranges`` drawn, independently, in the order of the names."""
-    return nominal.replace(_drawn(ranges, rng))
+    return nominal.replace(draw_figures(ranges, rng))
 
 
 def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lanes: int) -> Array:
@@ -133,7 +133,7 @@ def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lane
 
 def draw_rig(nominal: Parameters, ranges: Ranges, streams: Streams) -> Parameters:
     """What ``draw_parameters`` gives each of L lanes, in one rig whose drawn fields are (L,)."""
-    drawn = _drawn(ranges, streams)
+    drawn = draw_figures(ranges, streams)
     rig = copy.copy(nominal)
     for name, values in drawn.items():
         section, _, own = name.partition(".")
@@ -148,7 +148,8 @@ def draw_rig(nominal: Parameters, ranges: Ranges, streams: Streams) -> Parameter
     return rig
 
 
-def _drawn(ranges: Ranges, rng: Any) -> dict[str, Any]:
+def draw_figures(ranges: Ranges, rng: Any) -> dict[str, Any]:
+    """What is drawn of each range, sorted by name: a number each from a generator, or (L,) from ``Streams`` of L lanes."""
     return {name: _one_drawn(name, *ranges[name], rng) for name in sorted(ranges)}
 
 
@@ -157,5 +158,12 @@ def _one_drawn(name: str, low: float, high: float, rng: Any) -> Any:
         return rng.uniform(low, high)
     share = rng.uniform()
     octaves = exact.number("log2", high / low)
-    powers = [exact.number("exp", octaves * one / exact.LOG2_E) for one in np.ravel(share)]
-    return np.minimum(low * np.reshape(powers, np.shape(share)), high)[()]
+    powers = np.empty_like(share)
+    for lane, one in np.ndenumerate(share):
+        powers[lane] = _exp(octaves * one / exact.LOG2_E)
+    return np.minimum(low * powers, high)[()]
+
+
+def _exp(x: Any) -> Any:
+    """e^x, of a number, or of a symbol where the code that draws on a device is made."""
+    return exact.number("exp", x) if isinstance(x, float) else x.graph.node("exp", x)

@@ -152,7 +152,7 @@ WEIGHED = ("backstepping", "backstepping-weight")
 
 def frictionless(rig: Parameters) -> Parameters:
     """``rig`` without dry friction; the viscous one stays."""
-    return rig.replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
+    return rig.replace({f"cylinder{i}.{name}": 0.0 for i in (1, 2) for name in ("coulomb_friction", "pressure_friction")})
 
 
 def study_tasks(controllers: Sequence[dict[str, Any]], rig: Parameters) -> dict[tuple[str, str], Task]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
+from birthsim_env.parts.drawn.randomization import Ranges, draw_columns, draw_figures
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -30,20 +30,26 @@ def drawn_places(seeds: Seeds, ranges: Ranges) -> Array:
     return np.array([[streams.random() for _ in ranges] for streams in (stream(int(s), 0, "parameters") for s in seeds)]).T
 
 
+class Placed:
+    """``Streams`` that draw what stands at ``places`` (F, ...), one after the other."""
+
+    def __init__(self, places: Array) -> None:
+        self._places = iter(places)
+
+    def uniform(self, low: float = 0.0, high: float = 1.0) -> Array:
+        """``Streams.uniform``."""
+        place: Array = next(self._places)
+        return low + (high - low) * place
+
+
 def parameters_at(places: Array, ranges: Ranges) -> dict[str, Array]:
-    """The figures, SI units, at ``places`` (F, ...) of their ranges."""
-    sides = ((name, *ranges[name]) for name in sorted(ranges))
-    return {name: low + (high - low) * place for (name, low, high), place in zip(sides, places, strict=True)}
+    """The figures, SI units, at ``places`` (F, ...) of their ranges, which are equal ratios where a range is logarithmic."""
+    return draw_figures(ranges, Placed(places))
 
 
 def rigs_at(places: Array, ranges: Ranges, rig: Parameters) -> Array:
     """The rows of rigs (PARAMETERS, N) whose figures stand at ``places`` (F, N)."""
-    values = iter(parameters_at(places, ranges).values())
-
-    class Placed:
-        uniform = staticmethod(lambda low, high: next(values))
-
-    streams: Any = Placed
+    streams: Any = Placed(places)
     return draw_columns(rig, ranges, streams, places.shape[1])
 
 

@@ -18,7 +18,7 @@ from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, value_of
 from lab.studies.stability.rig_port import Port, RigPort
 
 PLACE = (0.5, 0.0)
@@ -91,8 +91,8 @@ def _mass_cases(rig: Parameters, hand: Array, mass: Array) -> Cases:
 def _friction_cases(rig: Parameters, hand: Array, scale: Array) -> Cases:
     changed = []
     for fraction in scale:
-        levels = fraction * rig.cylinder1.coulomb_friction, fraction * rig.cylinder2.coulomb_friction
-        changed.append(rig.replace({f"cylinder{i}.coulomb_friction": level for i, level in enumerate(levels, 1)}))
+        parts = [f"cylinder{i}.{name}" for i in (1, 2) for name in ("coulomb_friction", "pressure_friction")]
+        changed.append(rig.replace({part: fraction * value_of(rig, part) for part in parts}))
     return Cases(changed, hand, np.full(len(hand), SETPOINT))
 
 

@@ -11,7 +11,8 @@ from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.registry import register
 
-GAIN = 6.0
+GAIN = 10.0
+"""1/m. An error of 11 mm opens a valve beyond its overlap of 0.11; with a gain of 15 the head swings."""
 
 
 @register(controller="proportional-python", about="Opens valves in proportion to the error.", needs={"force sensor"})

@@ -74,8 +74,8 @@ def expected(controller, settings, hold, rig):
     scenario, friction = settings.get("scenario", "probe"), settings.get("friction", 1.0)
     changes = {"mechanics.mass": settings.get("mass", rig.mechanics.mass)}
     for name, cylinder in (("cylinder1", rig.cylinder1), ("cylinder2", rig.cylinder2)):
-        changes[f"{name}.coulomb_friction"] = cylinder.coulomb_friction * friction
-        changes[f"{name}.viscous_friction"] = cylinder.viscous_friction * friction
+        for own in ("coulomb_friction", "pressure_friction", "viscous_friction"):
+            changes[f"{name}.{own}"] = getattr(cylinder, own) * friction
     world = {"rig": rig, "parameters": rig.replace(changes), "valves": settings.get("valves", "two_valves")}
     world["user_force"] = Hand(scenario, settings.get("scenario_force", False), **hold)
     if "Kclx" in settings:

@@ -8,7 +8,7 @@ from birthsim_env.physics.compiled import lanes
 from birthsim_env.physics.geometry import amplification
 from birthsim_live.rig.stages import INSIDE, look_inside
 
-FRICTION = [getattr(lanes, name) for name in ("FC1", "FC2", "FV1", "FV2", "S0", "S1")]
+FRICTION = [getattr(lanes, name) for name in ("FC1", "FC2", "FP1", "FP2", "FV1", "FV2", "S0", "S1")]
 
 
 def moving_plant(law):

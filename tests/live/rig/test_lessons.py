@@ -1,7 +1,5 @@
 """What the lessons say of friction is so."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from baselines import evaluate
@@ -27,10 +25,8 @@ def test_the_head_shakes_and_more_so_on_pistons_that_slide_freely(page):
 def test_a_controller_that_expects_no_friction_holds_such_a_head_still():
     """So what shakes is the push against friction that is not there."""
     rig = Parameters()
-    free = {
-        name: replace(getattr(rig, name), coulomb_friction=0.0, viscous_friction=0.0) for name in ("cylinder1", "cylinder2")
-    }
-    frictionless = replace(rig, **free)
+    kinds = ("coulomb_friction", "pressure_friction", "viscous_friction")
+    frictionless = rig.replace({f"cylinder{i}.{kind}": 0.0 for i in (1, 2) for kind in kinds})
     law = make_controller("backstepping", frictionless)
     found = evaluate("BirthSIM/Probe-v3", law, "backstepping", 1, 0, progress=False, parameters=frictionless)
     assert found.metrics["hunting_x"][0] < 0.1
