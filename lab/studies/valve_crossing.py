@@ -79,12 +79,14 @@ def _crossing(value: float | None) -> str:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "sensors", "worlds", "crossing", *(head for _, _, head in COLUMNS.values())]]
+    rows = [["controller", "sensors", "crossing", *(head for _, _, head in COLUMNS.values())]]
     for row in content["figures"]:
-        cells = [" / ".join(map(number, row[name])) for name in COLUMNS]
-        rows.append([f"`{row['controller']}`", row["sensors"], row["worlds"], _crossing(row["crossing"]), *cells])
+        if row["worlds"] == "judged":
+            cells = [" / ".join(map(number, row[name])) for name in COLUMNS]
+            rows.append([f"`{row['controller']}`", row["sensors"], _crossing(row["crossing"]), *cells])
     count = content["settings"]["episodes"]
-    said = f"Chosen: {worlds(CHOSEN, count)}. Judged: {worlds(content['settings']['seed'], count)}."
+    chosen = f"The crossing was chosen on {worlds(CHOSEN, count)}, which the picture has too."
+    said = f"{worlds(content['settings']['seed'], count)}. {chosen}"
     return {"valve-crossing.md": f"{said}\n\n{markdown(rows)}\n"}
 
 

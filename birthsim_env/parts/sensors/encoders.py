@@ -110,6 +110,8 @@ def _look(world: World, seen: Seen, memory: int, shared: JointShared, tables: in
 class CountingBoard(JointBoard):
     """A board whose positions are those of encoders."""
 
+    counted = True
+
     def _position_clock(self) -> tuple[float, float]:
         board = self._electronics
         return min(board.encoder_rate, 1 / board.control_period), self._latest("encoder_latency")

@@ -117,41 +117,26 @@ def sense_rods(
 
 
 @kernel
-def _look_counting(world: World, seen: Seen, memory: int, shared: JointShared, tables: int, lane: int, n: int) -> int:
-    """One control instant, with encoders."""
+def _look(world: World, seen: Seen, memory: int, shared: JointShared, tables: int, lane: int, n: int) -> int:
+    """One control instant."""
     mine = slice(lane, lane + n)
     keys, e, queue = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine]
     arrived, own = tracker.Arrived(table2(tables, 3)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine])
     passed, late, readings = table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine], Readings(table2(tables, 6)[:, mine])
-    joint, rods = JointErrors(table2(tables, 8)[:, mine]), Rods(table2(tables, 9)[:, mine])
+    joint, rods, counted = JointErrors(table2(tables, 8)[:, mine]), Rods(table2(tables, 9)[:, mine]), shared.counted > 0.0
     for i in range(n):
         tick, key = int(world.tick[i]), keys[i]
-        count(world, seen.time[i], shared, joint, queue, arrived, key, i)
+        if counted:
+            count(world, seen.time[i], shared, joint, queue, arrived, key, i)
+        else:
+            track(world, seen.time[i], shared, e, queue, arrived, key, i)
         again, read = seen_again(own, tick, i), is_read(e, key, tick, i)
         sense_acceleration(world, readings, own, e, shared, key, again, read, i)
         if read:
-            read_encoders(world, seen, readings, arrived, joint, shared, i)
-            sense_pressures(world, readings, e, shared, key, i)
-        sense_rods(world, readings, rods, passed, late, e, joint, shared, key, again, read, i)
-        show(seen, readings, i)
-    return 0
-
-
-@kernel
-def _look_tracking(world: World, seen: Seen, memory: int, shared: JointShared, tables: int, lane: int, n: int) -> int:
-    """One control instant, with a tracker."""
-    mine = slice(lane, lane + n)
-    keys, e, queue = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine]
-    arrived, own = tracker.Arrived(table2(tables, 3)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine])
-    passed, late, readings = table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine], Readings(table2(tables, 6)[:, mine])
-    joint, rods = JointErrors(table2(tables, 8)[:, mine]), Rods(table2(tables, 9)[:, mine])
-    for i in range(n):
-        tick, key = int(world.tick[i]), keys[i]
-        track(world, seen.time[i], shared, e, queue, arrived, key, i)
-        again, read = seen_again(own, tick, i), is_read(e, key, tick, i)
-        sense_acceleration(world, readings, own, e, shared, key, again, read, i)
-        if read:
-            read_tracker(seen, readings, arrived, e, shared, i)
+            if counted:
+                read_encoders(world, seen, readings, arrived, joint, shared, i)
+            else:
+                read_tracker(seen, readings, arrived, e, shared, i)
             sense_pressures(world, readings, e, shared, key, i)
         sense_rods(world, readings, rods, passed, late, e, joint, shared, key, again, read, i)
         show(seen, readings, i)
@@ -169,6 +154,9 @@ class GaugingBoard(JointBoard):
     def _tables(self) -> tuple[NDArray[Any], ...]:
         return (*super()._tables, self._rods)
 
+    def stage(self) -> Stage:
+        return Stage(_look, self._joint_shared, tables=self._tables)
+
 
 @register(sensors="encoders-gauges", about="As encoders, with gauges in both rods in place of the force sensor.", order=5)
 class EncoderGaugeSensors(GaugingBoard, CountingBoard):
@@ -176,15 +164,9 @@ class EncoderGaugeSensors(GaugingBoard, CountingBoard):
 
     drawn = drawn_without(*TRACKER_PARAMETERS, *FORCE_PARAMETERS, also=(*ENCODER_PARAMETERS, *GAUGE_PARAMETERS))
 
-    def stage(self) -> Stage:
-        return Stage(_look_counting, self._joint_shared, tables=self._tables)
-
 
 @register(sensors="tracker-gauges", about="As honest, with gauges in both rods in place of the force sensor.", order=6)
 class TrackerGaugeSensors(GaugingBoard):
     """A tracker at the head, gauges at both rods, and pressure cells."""
 
     drawn = drawn_without(*FORCE_PARAMETERS, also=GAUGE_PARAMETERS)
-
-    def stage(self) -> Stage:
-        return Stage(_look_tracking, self._joint_shared, tables=self._tables)

@@ -1,6 +1,6 @@
 """A board with sensors at the cylinders: their errors, and how an episode draws them."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ class JointShared(Shared):
     encoder_rate = number("Hz", "of the encoders")
     encoder_stamped = number("s", "the latency of the encoders that their samples are stamped with")
     gauge_range = number("N", "full scale")
+    counted = number("1", "1 where encoders take the tracker's place")
 
 
 def drawn_without(*replaced: str, also: tuple[str, ...]) -> tuple[str, ...]:
@@ -49,12 +50,15 @@ def drawn_without(*replaced: str, also: tuple[str, ...]) -> tuple[str, ...]:
 class JointBoard(HonestBoard):
     """``HonestBoard`` with what sensors at the cylinders need."""
 
+    counted: ClassVar[bool] = False
+    """Whether encoders take the tracker's place."""
+
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         self._joint_errors: Array = np.zeros((JointErrors.size, num_envs))
         super().__init__(electronics, num_envs)
         # An encoder faster than the control board is read once a period.
         self._encoder_rate = min(electronics.encoder_rate, 1 / electronics.control_period)
-        of_joints = self._encoder_rate, electronics.encoder_latency, electronics.gauge_range
+        of_joints = self._encoder_rate, electronics.encoder_latency, electronics.gauge_range, float(self.counted)
         self._joint_shared: Array = np.concatenate([self._shared, of_joints])
 
     @vectorised
