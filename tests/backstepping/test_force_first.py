@@ -14,8 +14,6 @@ from tests.oracles.closed_loop import AT_ONCE
 
 RIG = Parameters().replace(AT_ONCE)
 LENGTH = RIG.cylinder2.stroke
-FULL = 1 - 1e-9
-"""The inverse of the curve comes this near to full stroke where a valve saturates."""
 
 
 def openings(cases: Array, rig: Parameters = RIG) -> tuple[Array, Array]:
@@ -84,7 +82,7 @@ def test_without_saturation_both_rates_are_had(changes: dict[str, float]) -> Non
     """The same openings as without an order of precedence, and exactly the wanted rates."""
     cases, rig = drawn(500, 1000.0, seed=0), RIG.replace(changes)
     first, neither = openings(cases, rig)
-    inside = np.abs(neither).max(axis=0) < FULL
+    inside = np.abs(neither).max(axis=0) < 1
     assert inside.sum() > 150
     np.testing.assert_allclose(first[:, inside], neither[:, inside], rtol=0, atol=1e-12)
     for case, opening in zip(cases.T[inside], first.T[inside], strict=True):
@@ -96,7 +94,7 @@ def test_where_a_valve_saturates_the_force_has_precedence(rates: float) -> None:
     """Lexicographic optimum: no valves give a nearer dF/dt, and with that none a nearer pressurisation."""
     cases = drawn(90, rates, seed=1)
     first, neither = openings(cases)
-    saturated, kept = np.abs(neither).max(axis=0) >= FULL, 0
+    saturated, kept = np.abs(neither).max(axis=0) >= 1, 0
     assert saturated.sum() > 40
     for case, opening, plain in zip(cases.T[saturated], first.T[saturated], neither.T[saturated], strict=True):
         assert_nearest(case, opening)

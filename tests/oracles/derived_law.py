@@ -254,10 +254,14 @@ def seen(piston: Array, speed: Array, pressures: Array, rig: Parameters) -> Meas
     return Measurement(clock, pose.end_effector, clock, velocity, pressures, np.zeros(piston.shape), sampled=False)
 
 
-def accelerations(rig: Parameters, width: float, compensate: bool) -> Callable[..., Any]:
-    """(13), or (5) with compensation, as a function of ``STATE``: dv1/dt and dv2/dt without a force that is only believed."""
+def accelerations(rig: Parameters, width: float, compensate: bool, coulomb: Any = (None, None)) -> Callable[..., Any]:
+    """(13), or (5) with compensation, as a function of ``STATE``: dv1/dt and dv2/dt without a force that is only believed.
+
+    ``coulomb`` as in ``rig_values``.
+    """
     f1, g1, f2, g2 = (e.subs(dict.fromkeys(BELIEVED, 0)) for e in model_13())
-    function, values = sp.lambdify([*STATE, *RIG], [f1 + g1 * F1, f2 + g2 * F2], cse=True), rig_values(rig, width, compensate)
+    function = sp.lambdify([*STATE, *RIG], [f1 + g1 * F1, f2 + g2 * F2], cse=True)
+    values = rig_values(rig, width, compensate, coulomb=coulomb)
     return lambda *state: function(*state, *values)
 
 
