@@ -27,7 +27,7 @@ def errors(probes: StiffnessTest, answers: StiffnessResult) -> tuple[Array, Arra
 def test_exact_sensors_and_friction_off_by_a_quarter(
     curve: Curve, most_error: float, most_hunting: float, law: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """5 and 40 N at five poses, 1000-4000 N/m, with LuGre's drift and without: measured 0.013 % and 0.0006 mm with linear valves.
+    """5 and 40 N at five poses, 1000-4000 N/m, with LuGre's drift and without; with linear valves measured 0.013 %, 0.0006 mm.
 
     The catalogue's, whose overlap is crossed softly: worst 0.84 %, 95 % within 0.17 %; 0.011 mm.
     """
@@ -52,7 +52,7 @@ def test_exact_sensors_and_friction_off_by_a_quarter(
     ],
 )
 def test_a_trackers_samples(law: str, forces: tuple[float, ...], seed: int) -> None:
-    """The rig as believed; over 960 pushes: median 0.34 %, 95 % 2.3 %, worst 6.2 %; hunting 0.49 mm. Elasto-plastic: worst 12 %.
+    """The rig as believed; over 960 pushes: median 0.34 %, 95 % 2.3 %, worst 6.2 % (elasto-plastic: 12 %); hunting 0.49 mm.
 
     Linear valves have 0.1 %, 0.6 % and 2.3 %: noise throws the valves across their overlap all the time.
     """

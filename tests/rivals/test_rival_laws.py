@@ -257,7 +257,10 @@ def test_lqr_moves_the_control_model_as_its_linear_model_says() -> None:
 
 
 def test_sliding_mode_reaches_its_layer_when_predicted_and_decays_there() -> None:
-    """Weightless, linear valves: |s| falls at h until h/b, in (|s0| - h/b)/h; then s decays at b, and errors as the triple pole at r."""
+    """Weightless: |s| falls at h until h/b, in (|s0| - h/b)/h; then s decays at b, and errors as the triple pole at r.
+
+    Of linear valves: others leave some of the flow out while they cross their overlap.
+    """
     rig, r, reaching, inside = IDEAL.replace({"mechanics.gravity": 0.0}), 25.0, 15.0, 60.0
     law = SlidingMode(rig, surface_rate=r, reaching_rate=reaching, layer_rate=inside, friction_fraction=0.0, dead_zone=0.0)
     start, reference, _, scale = beside_rest(rig, np.array([-5e-4, 1.2e-3]))
