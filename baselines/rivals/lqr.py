@@ -7,8 +7,7 @@ and of u over ``RATE_TOLERANCE``. Tolerances are those at the end effector: leng
 cylinder 1. Its gains are scheduled with kappa at the reference pose. dF/dt goes to the valves as in the paper, with its
 regulation of the pneumatic stiffness.
 
-These commands found the gains (with ideal, then with lab) by the search that birthsim tune had before it used Optuna. The
-second started from what the first had found:
+These commands found the gains (with ideal, then with lab). The second starts from what the first found:
     birthsim tune --controller lqr --trials 75 --seed 0 --sensors ideal --out out/first
     birthsim tune --controller lqr --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
@@ -142,12 +141,12 @@ class LinearQuadratic(TrackingController):
 
     LAW, CONSTANTS = staticmethod(control), Constants
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "integral_tolerance": (1e-6, 1e-3, 1.828e-05, 2.639e-05),
-        "position_tolerance": (3e-4, 1e-1, 0.001036, 0.0003),
-        "speed_tolerance": (1e-2, 3.0, 0.3138, 0.2182),
-        "force_tolerance": (1.0, 100.0, 5.517, 1.6),
-        "friction_fraction": (0.0, 1.0, 0.865, 0.9396),
-        "dead_zone": (0.0, 5e-4, 0.0, 0.0001245),
+        "integral_tolerance": (1e-6, 1e-3, 1.755e-05, 2.693e-05),
+        "position_tolerance": (3e-4, 1e-1, 0.002635, 0.001237),
+        "speed_tolerance": (1e-2, 3.0, 1.657, 0.03281),
+        "force_tolerance": (1.0, 100.0, 2.705, 2.002),
+        "friction_fraction": (0.0, 1.0, 0.4927, 0.6965),
+        "dead_zone": (0.0, 5e-4, 4.097e-06, 0.0001098),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, Any]:

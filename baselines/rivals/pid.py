@@ -7,8 +7,7 @@ within what the supply can give. F and the setpoint of the pneumatic stiffness (
     F = Pp Sp - Pn Sn,   K = k (Pp Sp/Lp + Pn Sn/Ln),
 and each chamber's flow is (6) solved for dP/dt = b (P* - P): proportional, with the piston's speed compensated.
 
-These commands found the gains (with ideal, then with lab) by the search that birthsim tune had before it used Optuna. The
-second started from what the first had found:
+These commands found the gains (with ideal, then with lab). The second starts from what the first found:
     birthsim tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/first
     birthsim tune --controller pid --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
@@ -109,12 +108,12 @@ class PositionPID(TrackingController):
 
     LAW, CONSTANTS = staticmethod(control), Constants
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "bandwidth": (15.0, 100.0, 73.04, 44.27),
-        "damping": (0.1, 2.0, 0.4617, 0.5684),
-        "integral_rate": (0.5, 30.0, 30.0, 9.951),
-        "pressure_gain": (40.0, 400.0, 395.6, 340.8),
-        "friction_fraction": (0.0, 1.0, 0.8704, 0.8328),
-        "dead_zone": (0.0, 5e-4, 0.0, 7.737e-06),
+        "bandwidth": (15.0, 100.0, 55.86, 47.97),
+        "damping": (0.1, 2.0, 0.6967, 0.3754),
+        "integral_rate": (0.5, 30.0, 17.8, 3.121),
+        "pressure_gain": (40.0, 400.0, 296.1, 398.8),
+        "friction_fraction": (0.0, 1.0, 0.1946, 0.5481),
+        "dead_zone": (0.0, 5e-4, 2.051e-05, 2.38e-05),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:

@@ -9,7 +9,7 @@ make ds/dt = -h sat(s/layer): the layer is reached in (|s| - layer)/h, inside s 
 at the end effector (kappa s of cylinder 1). h must beat 3 r times the acceleration by which the model is wrong. dF/dt goes to
 the valves as in the paper, with its regulation of the pneumatic stiffness.
 
-These commands found the gains (with ideal, then with lab) by the search that birthsim tune had before it used Optuna:
+This command found the gains (with ideal, then with lab):
     birthsim tune --controller sliding-mode --trials 75 --seed 0 --sensors ideal --out out/tune/sliding-mode-ideal
 """
 
@@ -91,11 +91,11 @@ class SlidingMode(TrackingController):
 
     LAW, CONSTANTS = staticmethod(control), Constants
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "surface_rate": (10.0, 100.0, 72.36, 28.38),
-        "reaching_rate": (100.0, 10000.0, 2607.0, 955.9),
-        "layer_rate": (10.0, 200.0, 14.79, 46.51),
-        "friction_fraction": (0.0, 1.0, 0.2856, 0.7042),
-        "dead_zone": (0.0, 5e-4, 1.763e-05, 0.0002013),
+        "surface_rate": (10.0, 100.0, 33.33, 23.96),
+        "reaching_rate": (100.0, 10000.0, 8965.0, 4340.0),
+        "layer_rate": (10.0, 200.0, 141.0, 198.3),
+        "friction_fraction": (0.0, 1.0, 0.1183, 0.9448),
+        "dead_zone": (0.0, 5e-4, 5.316e-05, 4.506e-05),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:

@@ -31,8 +31,10 @@ def watch(sensors, parameters, periods=300, environment=CIRCLE, seed=0, **argume
     env = gymnasium.make(environment, sensors=sensors, parameters=parameters, policy_period=0.001, **arguments).unwrapped
     env.reset(seed=seed)
     rng, rows = np.random.default_rng(1), []
-    for _ in range(periods):
-        env.step(rng.uniform(-0.4, 0.4, env.action_space.shape).astype(np.float32))
+    for k in range(periods):
+        if k % 10 == 0:  # so long that spools leave their overlap
+            action = rng.uniform(-0.4, 0.4, env.action_space.shape).astype(np.float32)
+        env.step(action)
         seen, now = env.measurement, env.simulation
         true = now.plant.piston[:, 0], now.motion[:, 0], now.force[:, 0]
         rows.append((seen.position, seen.time - seen.position_time, seen.velocity, seen.user_force, *true))

@@ -48,7 +48,7 @@ def test_what_is_drawn_is_said():
     words = described(Parameters().replace({"mechanics.mass": 9.0}), True)
     assert words.startswith("rigs drawn: ")
     assert "mass 7.2 to 10.8 kg" in words
-    assert "coulomb friction of cylinder1 6 to 25 N" in words
+    assert "coulomb friction of cylinder1 3 to 21 N" in words
     assert described(Parameters(), False) == described(Parameters(), "scenario") == "the rig as described"
     assert described(Parameters(), {"mechanics.mass": (2, 3)}) == "rigs drawn: mass 2 to 3 kg"
 

@@ -21,10 +21,21 @@ from birthsim_env.registry import names
 RIG = Parameters()
 DRAWN = documented_ranges(RIG)
 READ = {row.name: parameters_read(row.of, RIG) for row in RIG_ROWS}
+CURVATURE = "curvature"
 COLUMNS = {
-    name: next(row.name for row in RIG_ROWS if name in READ[row.name] and row.of(RIG) == value_of(RIG, name)) for name in DRAWN
+    name: next(row.name for row in RIG_ROWS if name in READ[row.name] and row.of(RIG) == value_of(RIG, name))
+    for name in DRAWN
+    if not name.endswith(CURVATURE)
 }
 """Parameter that is drawn -> the row that is it."""
+
+
+def values_of(name, rows):
+    """A parameter that is drawn, (lanes,), from the rows of the rigs; the slope of a valve's edge is (1 + c)/(1 - d)."""
+    if name in COLUMNS:
+        return rows[COLUMNS[name]]
+    side = name.removeprefix("valves.").removesuffix(f"_{CURVATURE}")
+    return rows[f"{side}_slope_p1"] * (1 - rows[f"{side}_overlap_p1"]) - 1
 
 
 def world(name="BirthSIM/Descent-v2", seed=11, lanes=4, **arguments):
@@ -90,15 +101,18 @@ def test_without_randomization_every_seed_gives_the_same_fixed_experiment(name):
 
 def test_draws_stay_inside_their_ranges_and_fill_them_independently():
     drawn = rigs(randomize="plant")
-    for name, (low, high) in DRAWN.items():
-        values = (drawn[COLUMNS[name]] - low) / (high - low)
-        assert 0 <= values.min() < 0.01, name
-        assert 0.99 < values.max() <= 1, name
+    shares = {}
+    for name, bounds in DRAWN.items():
+        scale = np.log if DECLARED[name].logarithmic else np.asarray
+        low, high = scale(bounds)
+        shares[name] = values = (scale(values_of(name, drawn)) - low) / (high - low)
+        assert -1e-12 <= values.min() < 0.01, name
+        assert 0.99 < values.max() <= 1 + 1e-12, name
         # Uniform: no decile is off by more than 4.5 standard deviations.
         counts = np.histogram(values, 10, (0, 1))[0]
         assert np.abs(counts - 150).max() < 4.5 * np.sqrt(150 * 0.9), name
     for one, other in itertools.combinations(DRAWN, 2):
-        correlation = np.corrcoef(drawn[COLUMNS[one]], drawn[COLUMNS[other]])[0, 1]
+        correlation = np.corrcoef(shares[one], shares[other])[0, 1]
         assert abs(correlation) < 4.5 / np.sqrt(1500), (one, other)
     nominal = dict(zip(PARAMETER_NAMES, parameter_column(Parameters()), strict=True))
     # What is not drawn, nor derived from it, keeps its nominal value.

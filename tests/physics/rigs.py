@@ -7,7 +7,7 @@ from birthsim_env.physics.rig.servovalves import MPYE_5_M5
 
 LAWS = ("lugre", "coulomb", "elasto_plastic")
 NO_FRICTION = {
-    **{f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "viscous")},
+    **{f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "pressure", "viscous")},
     "friction.law": "coulomb",
 }
 CATALOGUE = MPYE_5_M5.changes()

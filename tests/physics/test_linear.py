@@ -17,6 +17,7 @@ from tests.console import call, strict
 from tests.physics.rigs import OTHER, PRESSED
 
 COULOMB = {"friction.law": "coulomb"}
+DRY = {f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "pressure")}
 RIGS = {
     "default": {},
     "other": OTHER,
@@ -54,7 +55,7 @@ def plant_jacobian(rig: Parameters, model: LinearModel) -> Array:
     return differences(lambda s: plant.derivatives(s[:18], s[18:22], s[22:]), point, SCALES)
 
 
-@pytest.mark.parametrize("openings", [(0.0, 0.0, 0.0, 0.0), (0.1, -0.2, -0.05, 0.02)], ids=["shut", "open"])
+@pytest.mark.parametrize("openings", [(0.0, 0.0, 0.0, 0.0), (0.2, -0.3, -0.15, 0.02)], ids=["shut", "open"])
 @pytest.mark.parametrize("name", RIGS)
 def test_a_stuck_model_is_the_plants_central_difference(name: str, openings: tuple[float, ...]) -> None:
     rig = Parameters().replace(RIGS[name])
@@ -74,8 +75,8 @@ def test_a_stuck_model_is_the_plants_central_difference(name: str, openings: tup
 
 def test_a_sliding_model_is_a_plant_without_dry_friction() -> None:
     rig = Parameters().replace(OTHER)
-    model = linearize(rig, pose_of(rig, 0.03, -0.07), friction="sliding", openings=(0.1, -0.2, 0.0, 0.02))
-    smooth = rig.replace({**COULOMB, "cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
+    model = linearize(rig, pose_of(rig, 0.03, -0.07), friction="sliding", openings=(0.2, -0.3, 0.0, 0.15))
+    smooth = rig.replace({**COULOMB, **DRY})
     kept = [at.STATE_NAMES.index(signal.name) for signal in model.states]
     assert not {at.Z1, at.Z2} & set(kept)
     np.testing.assert_allclose(model.at.rates[[at.V1, at.V2]], 0.0, atol=1e-12)
@@ -150,8 +151,7 @@ def test_options_of_a_rig_have_their_states() -> None:
 
 def test_a_small_sine_moves_the_plant_as_the_frequency_response_says() -> None:
     """A hand of 0.05 N at 2 Hz on a rig without dry friction and leakage; the plant's answer over the last of 16 periods."""
-    dry = {f"cylinder{k}.coulomb_friction": 0.0 for k in (1, 2)}
-    rig = Parameters().replace({**COULOMB, **dry, "valves.leakage_ratio": 0.0})
+    rig = Parameters().replace({**COULOMB, **DRY, "valves.leakage_ratio": 0.0})
     pose, frequency, periods, samples = pose_of(rig, 0.02, -0.05), 2.0, 16, 250
     model = linearize(rig, pose, friction="sliding")
     plant = Plant(rig)

@@ -18,10 +18,13 @@ _JERKS = [(_rng.uniform(0.4, 1), _rng.uniform(-80, 80, 2)) for _ in range(PERIOD
 
 
 def stick_slip(k: int) -> tuple[Array, Array]:
-    """Short puffs with rests between, and a hand that hardly moves anything: both pistons stick, slip and stick again."""
+    """Short puffs with rests between, and a hand that hardly moves anything: both pistons stick, slip and stick again.
+
+    Valves with the overlap of the default rig open 6 and 10 %.
+    """
     puff = (-1) ** (k // 20) * (k % 10 < 5)
     hand = 4 * math.sin(2 * math.pi * 3 * k * PERIOD), 3 * math.sin(2 * math.pi * 2 * k * PERIOD)
-    return puff * np.array([0.05, -0.05, 0.1, -0.1]), np.array(hand)
+    return puff * np.array([0.15, -0.15, 0.17, -0.17]), np.array(hand)
 
 
 def strong(k: int) -> tuple[Array, Array]:
@@ -32,8 +35,9 @@ def strong(k: int) -> tuple[Array, Array]:
 
 
 def smooth(_: int) -> tuple[Array, Array]:
-    """Constant openings and a constant push: started from speed, nothing reverses and no valve shuts for 40 ms."""
-    return np.array([0.05, -0.02, -0.1, 0.06]), np.array([-20.0, -30.0])
+    """Constant openings beyond the overlap and a constant push: started from speed with open valves, nothing reverses and no
+    valve shuts for 40 ms."""
+    return np.array([0.15, -0.13, -0.18, 0.15]), np.array([-20.0, -30.0])
 
 
 MOTIONS: dict[str, Motion] = {"stick-slip": stick_slip, "strong": strong}

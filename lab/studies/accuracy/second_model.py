@@ -39,7 +39,8 @@ ELEMENT_SCALES = np.ones(2 * ELEMENTS)
 def constants(rig: Parameters) -> tuple[Array, ...]:
     """Numbers of a rig: linkage, mass, friction per cylinder, its law, chambers, valves, their edges, air.
 
-    The last numbers of the law are the way in which each element slips, 1 or -1, and 0 of those that stick.
+    The last numbers of the law are the rate at which a bristle's relaxation is held, here nowhere, and the way in which each
+    element slips, 1 or -1, and 0 of those that stick.
     """
     g, m, f, v, air = rig.geometry, rig.mechanics, rig.friction, rig.valves, rig.air
     cylinders = (rig.cylinder1, rig.cylinder2)
@@ -51,7 +52,7 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     bristle = f.bristle_stiffness, f.bristle_damping
     number = ("coulomb", "lugre", "elasto_plastic", "gms").index(f.law)
     numbers = f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio, f.attraction
-    law = np.array([number, *numbers, *np.zeros(2 * ELEMENTS)], dtype=float)
+    law = np.array([number, *numbers, np.inf, *np.zeros(2 * ELEMENTS)], dtype=float)
     heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
     valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
     edges = np.empty((4, 2, 3))  # overlap, curvature and share of the edges to supply and exhaust
@@ -200,18 +201,22 @@ def rates_and_levels(
 
         fc = unpressed + growth * ((pressure[0] - atmosphere) + (pressure[1] - atmosphere))
         fc = max(fc, 0.0) * (1 + asymmetry * np.sign(v))
-        level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
+        # A trial of the solver's, which it then rejects, may leave next to no air, and so no level to divide by.
+        level = max(fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2), 1e-9)
         found[c], found[2 + c] = v, level
         if law[0] == 3:
             rubbing = fv * v
             for e in range(ELEMENTS):
                 k, force, stiffness = 18 + ELEMENTS * c + e, s[18 + ELEMENTS * c + e], STIFFNESS[e] * law[3]
                 strength = STIFFNESS[e] * REACH[e]
-                ds[k] = element_rate(force, law[8 + ELEMENTS * c + e], v, strength, stiffness, level, law[7])
+                ds[k] = element_rate(force, law[9 + ELEMENTS * c + e], v, strength, stiffness, level, law[7])
                 rubbing += force + law[4] * ds[k] / law[3]
         elif law[0] > 0:
             alpha = 1.0 if law[0] == 1 else plastic_fraction(s[12 + c], v, level / law[3], law[6])
-            sliding = v - alpha * law[3] * abs(v) / level * s[12 + c]
+            relaxation = law[3] * abs(v) / level
+            sliding = v - alpha * relaxation * s[12 + c]
+            if relaxation > law[8]:
+                sliding *= law[8] / relaxation
             ds[12 + c] = sliding
             rubbing = law[3] * s[12 + c] + law[4] * sliding + fv * v
         else:
@@ -229,9 +234,13 @@ def rates_and_levels(
 class SecondModel:
     """A rig in these coordinates, with translations from and to what the plant shows."""
 
-    def __init__(self, rig: Parameters, observed: Array, state: Array) -> None:
-        """``observed`` is the plant's end effector (4,), ``state`` its state (18,), for the same instant."""
+    def __init__(self, rig: Parameters, observed: Array, state: Array, relaxation_limit: float = np.inf) -> None:
+        """``observed`` is the plant's end effector (4,), ``state`` its state (18,), for the same instant.
+
+        With a ``relaxation_limit`` (1/s) a bristle that relaxes more quickly is slowed down as the plant's is.
+        """
         self.constants = constants(rig)
+        self.constants[2][8] = relaxation_limit
         self._rig = rig
         pressure, temperature = state[[6, 8, 10, 12]], state[[7, 9, 11, 13]]
         mass = pressure * self._volumes(observed) / (rig.air.gas_constant * temperature)
@@ -293,7 +302,7 @@ class SecondModel:
         if len(scales) == 18:
             return []
         events: list[Any] = []
-        for k, way in enumerate(self.constants[2][8:]):
+        for k, way in enumerate(self.constants[2][9:]):
             cylinder = k // ELEMENTS
             if way == 0:
                 events.append(lambda _, s, k=k: self._margins(s * scales, command, push)[1][k])
@@ -306,7 +315,7 @@ class SecondModel:
         """Elements slip that have reached their share, the way that they are bent, until their piston comes to rest."""
         if len(self.state) == 18:
             return
-        (speeds, left), ways = self._margins(self.state, command, push), self.constants[2][8:]
+        (speeds, left), ways = self._margins(self.state, command, push), self.constants[2][9:]
         for k, force in enumerate(self.state[18:]):
             v = speeds[k // ELEMENTS]
             if ways[k] * v <= 1e-12:

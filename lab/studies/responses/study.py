@@ -1,6 +1,7 @@
 """Frequency responses of the rig with shut valves: from hand and valves to position, and from valves to stiffness.
 
-Sliding and stuck pistons at a low and a high pneumatic stiffness, with the resonance and the bandwidth of every curve.
+Sliding and stuck pistons at a low and a high pneumatic stiffness, with the resonance and the bandwidth of every curve. Spools
+move about the ends of their overlap.
 """
 
 from itertools import product
@@ -11,7 +12,7 @@ import numpy as np
 
 from baselines.bench.statistics import number
 from baselines.work.tasks import Result, Task
-from birthsim_env import balanced_pressures, linearize
+from birthsim_env import Parameters, balanced_pressures, linearize
 from birthsim_env.gradients.linear.model import LinearModel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.registry import register
@@ -35,6 +36,18 @@ STIFFNESS = {"low": (3500.0, 1900.0), "high": (5200.0, 2700.0)}
 FRICTION = ("sliding", "stuck")
 """What the pistons do."""
 
+_VALVES = Parameters().valves
+EDGES = {
+    f"valves.{side}_{name}": value
+    for side, d, c in (
+        ("supply", _VALVES.supply_overlap, _VALVES.supply_curvature),
+        ("exhaust", _VALVES.exhaust_overlap, _VALVES.exhaust_curvature),
+    )
+    for name, value in (("overlap", 0.0), ("curvature", (1 + c) / (1 - d) - 1))
+}
+"""Valves that have, when shut, the gain of the default rig's where these leave their overlap, (1 + c)/(1 - d). Within it those
+have none."""
+
 CURVES: dict[str, tuple[str, float, str, dict[str, float], bool]] = {
     "hand Fx to x": ("mm/N", 1e3, "x", {"Fx": 1.0}, False),
     "hand Fy to y": ("mm/N", 1e3, "y", {"Fy": 1.0}, False),
@@ -49,9 +62,9 @@ def measure(title: str, pose: list[float]) -> Result:
     """One of ``CURVES`` with every friction and stiffness: ``size`` at 0.5 Hz in its unit, ``resonance``, Hz, and its ``peak``,
     ``bandwidth``, Hz, and what is drawn: ``magnitude`` and ``phase``, degrees."""
     _, factor, output, inputs, integrates = CURVES[title]
-    found = []
+    rig, found = Parameters().replace(EDGES), []
     for friction, name in product(FRICTION, STIFFNESS):
-        model = linearize(None, pose, balanced_pressures(None, pose, STIFFNESS[name]), friction=friction)
+        model = linearize(rig, pose, balanced_pressures(rig, pose, STIFFNESS[name]), friction=friction)
         answer = factor * response(model, output, inputs)
         size = np.abs(2 * np.pi * FREQUENCY * answer if integrates else answer)
         resonance, peak = resonance_of(size) or (None, None)

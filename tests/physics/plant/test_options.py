@@ -74,8 +74,9 @@ class OtherOptions:
         if self.tube:
             pressures, temperatures = self.at_ends(ends), np.full(4, air.temperature)
         total = []
-        for p, t, spool in zip(pressures, temperatures, s[14:18], strict=True):
-            opened = v.sonic_conductance * (max(sign * spool, 0.0) + v.leakage_ratio)
+        edges = self.inner.constants[5][:, 0 if sign > 0 else 1]
+        for p, t, spool, edge in zip(pressures, temperatures, s[14:18], edges, strict=True):
+            opened = v.sonic_conductance * (second_model.opened(sign * spool, edge) + v.leakage_ratio)
             how = (v.critical_ratio, air.reference_density, air.reference_temperature)
             forward = source > p
             args = (opened, source, air.temperature, p, *how) if forward else (opened, p, t, source, *how)
@@ -141,17 +142,17 @@ def test_a_plant_with_reservoir_tubes_and_handle_moves_as_the_second_model_with_
         model.advance(command, push, PERIOD)
         for one in (plant, plain):
             one.advance(command[:, None], push[:, None], PERIOD)
-        # As the plant without options follows the second model in steps of 0.25 ms.
-        np.testing.assert_allclose(plant.end_effector()[:2, 0], model.port, atol=2e-5)
-        np.testing.assert_allclose(plant.pressures[:, 0], model.inner.pressures, rtol=2e-3)
+        # About twice what was measured, where the plant without options is as far from the second model.
+        np.testing.assert_allclose(plant.end_effector()[:2, 0], model.port, atol=2.6e-6)
+        np.testing.assert_allclose(plant.pressures[:, 0], model.inner.pressures, rtol=1.7e-5)
         if "chambers.tube_length" in changes:
             np.testing.assert_allclose(
-                plant.memory[4 + options.TUBES : 4 + options.FLOWS, 0], model.at_ends(model.ends), rtol=4e-3
+                plant.memory[4 + options.TUBES : 4 + options.FLOWS, 0], model.at_ends(model.ends), rtol=2.1e-4
             )
-            np.testing.assert_allclose(plant.memory[4 + options.FLOWS : 4 + options.BRISTLES, 0], model.ends[4:], atol=3e-5)
+            np.testing.assert_allclose(plant.memory[4 + options.FLOWS : 4 + options.BRISTLES, 0], model.ends[4:], atol=3e-6)
         if "air.supply_conductance" in changes:
             supply = plant.lane_parameters[at.SUPPLY, 0]
-            assert supply == pytest.approx(model.pressure(model.reservoir), rel=1e-4)
+            assert supply == pytest.approx(model.pressure(model.reservoir), rel=1.7e-6)
             assert plant.lane_parameters[at.INVERSE_SUPPLY, 0] == 1 / supply
             lowest = min(lowest, supply)
         apart = max(apart, np.abs(plant.end_effector() - plain.end_effector())[:2].max())
@@ -250,12 +251,17 @@ def test_a_chamber_behind_a_long_tube_feels_an_opened_valve_late():
     assert arrived[29] > 0.85
 
 
-SIZES = [(0.02, 0.004), (0.5, 0.001), (0.5, 0.0025), (1.0, 0.004), (3.0, 0.006), (0.2, 0.02), (10.0, 0.02), (0.05, 0.001)]
+SIZES = {
+    **{(0.02, 0.004): 800.0, (0.5, 0.001): 17.0, (0.5, 0.0025): 50.0, (1.0, 0.004): 53.0},
+    **{(3.0, 0.006): 37.0, (0.2, 0.02): 1750.0, (10.0, 0.02): 1.5, (0.05, 0.001): 40.0},
+}
+"""Length and bore of tubes, m, and Pa, about twice what was measured; linear valves halve what is the most of them."""
 
 
 @pytest.mark.parametrize(("length", "bore"), SIZES)
 def test_the_step_follows_tubes_of_every_size(length, bore):
-    """A policy step at the longest step is near that in steps of 1/16 ms, through openings, closings and equal pressures."""
+    """A policy step at the longest step is near that in steps of 1/16 ms, through openings, closings and equal pressures; a
+    spool that is thrown open leaves its overlap amid a step."""
     coarse, fine = held(length, bore), held(length, bore)
     rng, apart, span = np.random.default_rng(2), 0.0, 0.0
     for _ in range(40):
@@ -268,7 +274,7 @@ def test_the_step_follows_tubes_of_every_size(length, bore):
         assert np.abs(coarse.memory[ends] - fine.memory[ends]).max() < 8e3
         span = max(span, np.ptp(coarse.pressures))
     assert span > 5e4
-    assert apart < 600.0
+    assert apart < SIZES[length, bore]
 
 
 def test_a_cell_at_the_valve_shows_the_pressure_there():
@@ -349,6 +355,6 @@ def test_every_range_can_be_drawn_and_none_is_unless_it_is_named():
     nominal = Parameters()
     assert checked_ranges(WORTH, nominal, "honest") == WORTH
     assert not set(WORTH) & set(documented_ranges(nominal, "honest"))
-    assert "supply_overlap" not in nominal.to_dict()["valves"], "no stored rig changes"
+    assert not WORTH.keys() & {f"{section}.{name}" for section, own in nominal.to_dict().items() for name in own}
     assert options.are_off(Plant().lane_parameters)
     assert Parameters.from_dict(nominal.replace(EACH["all"]).to_dict()) == nominal.replace(EACH["all"])

@@ -14,7 +14,8 @@ import pytest
 
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.compiled.lanes import FC1, FC2, LUGRE, S0, SPOOLS, STATIC_RATIO, Z1, Z2, Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -64,23 +65,27 @@ def test_a_million_policy_steps_stay_finite_and_explained() -> None:
     rigs = corner_rigs(lanes, rng)
     plant = Plant(rigs, lanes)
     dead_volume = np.array([rig.chambers.dead_volume for rig in rigs])
-    breakaway = plant.lane_parameters[STATIC_RATIO] * plant.lane_parameters[[FC1, FC2]] / plant.lane_parameters[S0]
+    rig, air = plant.lane_parameters, Parameters().air.atmospheric_pressure
+    pressed, overlap = np.zeros((2, lanes)), rig[at.SUPPLY_OVERLAP_P1 : at.SUPPLY_OVERLAP_P1 + 4]
     # Work of 200 N, of the bore at full supply and of the weight over the whole stroke, all into 2 kg.
     outside, quickest = 0, math.sqrt(2 * (200 + 7e5 * BORE + 2 * 9.81) * 0.4 / 2)
     for command, force in rough_handling(lanes, steps, rng):
         plant.advance(command, force, POLICY_PERIOD)
         assert np.isfinite(plant.state).all()
-        bar, kelvin, spool = plant.pressures / 1e5, plant.temperatures, plant.state[list(SPOOLS)]
+        bar, kelvin, spool = plant.pressures / 1e5, plant.temperatures, plant.state[list(at.SPOOLS)]
         assert np.all((bar > 0.02) & (bar < 250) & (kelvin > 120) & (kelvin < 1400))
         fraction = volume_fractions(plant, dead_volume)
         assert fraction.min() > 0, "an end stop gave way until a chamber had no volume left"
         squeezed, torn = bar > 20, bar < 0.2
         assert np.all(fraction[squeezed] < 0.6), "above 20 bar without being squeezed"
-        assert np.all(spool[torn] < 0.01), "below 0.2 bar with the supply open"
+        assert np.all((spool - overlap)[torn] < 0.01), "below 0.2 bar with the supply open"
         outside += np.any(squeezed | torn, axis=0).sum()
-        bristle = np.abs(plant.state[[Z1, Z2]])
+        # At the highest pressures of a lane so far.
+        pressed = np.maximum(pressed, plant.pressures.reshape(2, 2, lanes).sum(axis=1) - 2 * air)
+        breakaway = rig[at.STATIC_RATIO] * (rig[[at.FC1, at.FC2]] + rig[[at.FP1, at.FP2]] * pressed) / rig[at.S0]
+        bristle = np.abs(plant.state[[at.Z1, at.Z2]])
         assert np.all(bristle <= breakaway * (1 + 1e-9))
-        assert not bristle[:, plant.lane_parameters[LUGRE] == 0].any()
+        assert not bristle[:, plant.lane_parameters[at.LUGRE] == 0].any()
         assert np.abs(plant.piston_speed[1]).max() < quickest
         assert np.all(np.abs(plant.piston) < [[0.11], [0.205]])
     assert outside < 0.01 * lanes * steps
@@ -99,5 +104,6 @@ def test_extremes_are_the_equations_own() -> None:
         peaks = np.maximum(peaks, [coarse.pressures.max(axis=0), fine.pressures.max(axis=0)])
     assert (peaks[1] > 20e5).sum() >= 3, "some lane must have left the usual range"
     gap = np.abs(peaks[0] / peaks[1] - 1)
-    assert np.median(gap) < 1e-5
+    # About twice what was measured; with linear valves, whose flow has no corner at the overlap, the median is 7e-6.
+    assert np.median(gap) < 2.5e-5
     assert gap.max() < 0.02

@@ -75,7 +75,7 @@ def test_toml_file_names_only_what_differs(tmp_path: Path) -> None:
 def test_columns_of_the_kernels_follow_their_names() -> None:
     rig = Parameters().replace({"mechanics.mass": 4.5, "cylinder1.coulomb_friction": 10.0, "friction.static_ratio": 1.5})
     column = dict(zip(PARAMETER_NAMES, parameter_column(rig), strict=True))
-    expected = {"mass": 4.5, "fc1": 10, "fc2": 15, "static_ratio": 1.5, "fp1": 0, "k1": 0.43, "half_l2": 0.2, "gamma": 1.4}
+    expected = {"mass": 4.5, "fc1": 10, "fc2": 11.7, "static_ratio": 1.5, "fp1": 5e-6, "k1": 0.43, "half_l2": 0.2, "gamma": 1.4}
     expected |= {"d_squares": 0.35**2 + 0.25**2, "d_product": 2 * 0.35 * 0.25, "perimeter1": math.pi * 0.025}
     expected |= {"leakage": 0.005 * 3.9e-9, "index": 1.2, "breakaway": 0.7, "steepness": 1 / 0.3}
     assert {name: column[name] for name in expected} == pytest.approx(expected, rel=1e-14)
