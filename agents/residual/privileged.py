@@ -16,8 +16,12 @@ from birthsim_env.physics.compiled.lanes import Array
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[Any]]
 
-DRAWN = (at.MASS, at.FC1, at.FC2, at.FV1, at.FV2, at.TAU, at.DEAD_VOLUME, at.H_WALL)
-"""Rows of the parameters that randomisation of a rig draws; friction: Coulomb and viscous, of cylinders 1 and 2."""
+DRAWN = (
+    *(at.MASS, at.FC1, at.FC2, at.FP1, at.FP2, at.FV1, at.FV2, at.S0, at.TAU, at.DEAD_VOLUME, at.H_WALL),
+    *(at.SUPPLY_OVERLAP_P1, at.SUPPLY_SLOPE_P1, at.EXHAUST_OVERLAP_P1, at.EXHAUST_SLOPE_P1),
+)
+"""Rows of the parameters that randomisation of a rig draws. Friction: Coulomb, what pressure adds, and viscous, of cylinders 1
+and 2, and the bristles. All valves have the edges of the first; overlap and slope, (1 + c)/(1 - d), tell the curvature."""
 
 PRESSURE_UNIT, PLACE_UNIT = 2000.0, 1e-3
 """Pa and m that are observed as 1: the default bias of a pressure cell, and the default distortion of the tracker."""

@@ -14,7 +14,7 @@ EXCITING = "valves.time_constant"
 
 def widened(rig: Parameters, margin: float) -> Parameters:
     """``rig``, whose ranges end a ``margin`` further on where it oscillates: with 0.25 masses of 2 to 5 kg begin at 1.6 kg,
-    and time constants of 1.5 to 8 ms end at 10 ms. What its ranges do not have is not drawn.
+    and time constants of 1.2 to 8 ms end at 10 ms. What its ranges do not have is not drawn.
     """
     ranges, known = {name: (low, high) for name, low, high in rig.ranges}, documented_ranges(rig)
     for name in (*CALMING, EXCITING):

@@ -68,8 +68,10 @@ def opening_of(part: float, edge: Edge, crossing: float) -> float:
     What then leaves the valve is less than the wish, and catches up with it on the way to ``crossing``: the later, the more
     steeply, which loops answer by chatter. A ramp catches up later than this parabola.
     """
-    beyond = _root(min(part, largest_part(edge)), edge.slope, edge.bend)
-    return min(beyond + edge.overlap * _crossed(part, crossing), 1.0)
+    most = largest_part(edge)
+    beyond = _root(min(part, most), edge.slope, edge.bend)
+    # By itself the root comes one rounding short of full stroke, at which laws see that a valve saturates.
+    return min(beyond + edge.overlap * _crossed(part, crossing), 1.0) if part < most else 1.0
 
 
 @helper
@@ -84,6 +86,7 @@ def common_opening(part: float, share: float, one: Edge, other: Edge, crossing: 
     slope = weight * first.slope if alone else second.slope + weight * (first.slope - 2.0 * first.bend * lead - second.slope)
     bend = weight * first.bend if alone else second.bend + weight * (first.bend - second.bend)
     reach, rest = 1.0 - start, part if alone else part - begun
-    beyond = _root(min(rest, reach * (slope - bend * reach)), slope, bend)
+    most = reach * (slope - bend * reach)
+    beyond = _root(min(rest, most), slope, bend)
     opened = beyond + (start - first.overlap) + first.overlap * _crossed(part, crossing)
-    return max(0.0, min(1.0, opened))
+    return max(0.0, min(1.0, opened)) if rest < most else 1.0

@@ -32,8 +32,10 @@ def random_situations(
     s["pneumatic"] = rng.uniform([[2500], [1300]], [[5000], [2600]], (2, lanes))
     s["pneumatic_wanted"] = s["pneumatic"] + rng.normal(0, 50, (2, lanes))
     s["pneumatic_rate"] = rng.normal(0, 500, (2, lanes))
-    values = derived.rig_values(rig, width, compensate)
     errors, _ = derived.errors_and_rates()
+    # The sum of the pressures, which presses the seals, follows from the pneumatic stiffness and hardly from the force.
+    about = derived.air_for(np.zeros((2, lanes)), s["pneumatic"], s["piston"], rig)
+    values = derived.rig_values(rig, width, compensate, coulomb=derived.coulomb_levels(about, s["speed"], rig))
     without_air = [*s["piston"], *s["speed"], 0.0, 0.0, *s["wanted"], *s["gains"], *s["believed"], *values]
     star = -np.array([errors(*without_air)[i][2] for i in (0, 1)])
     s["force"] = star + rng.normal(0, 3, (2, lanes))
@@ -79,7 +81,8 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
     controller = BacksteppingController(rig, pneumatic_gain=gain, sign_width=width, **options)
     got = controller.command(*as_signals(s, rig), s["believed"], s["feedforward_rate"])
     _, wanted_rates = derived.errors_and_rates()
-    values = derived.rig_values(rig, width, compensate, frozen)
+    levels = derived.coulomb_levels(s["pressures"], s["speed"], rig)
+    values = derived.rig_values(rig, width, compensate, frozen, levels)
     force_rate = np.array(
         wanted_rates(
             *s["piston"], *s["speed"], *s["force"], *s["wanted"], *s["gains"], *s["believed"], *values, *s["feedforward_rate"]

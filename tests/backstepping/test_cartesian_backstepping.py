@@ -11,8 +11,8 @@ from baselines.controller import Controller
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles import closed_loop, rigid_body
-from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles import closed_loop, derived_law, rigid_body
+from tests.oracles.closed_loop import AT_ONCE, FRICTIONLESS, IDEAL
 
 WIDTH = 0.003
 """m/s, of the smoothed sign."""
@@ -45,7 +45,7 @@ def times(matrices: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("nij,jn->in", matrices, vectors))
 
 
-@pytest.mark.parametrize("rig", [FRICTIONLESS, ANOTHER], ids=["frictionless", "another rig"])
+@pytest.mark.parametrize("rig", [FRICTIONLESS.replace(AT_ONCE), ANOTHER.replace(AT_ONCE)], ids=["frictionless", "another rig"])
 def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> None:
     """j = jt - 3 C (a - at + K e/m) - (3 C^2 + 2)(v - vt) + D K e/m^2, with Coulomb friction constant in its derivative."""
     lanes, mass = 60, rig.mechanics.mass
@@ -58,11 +58,10 @@ def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> 
     reference.rows[:8], reference.rows[10:12] = motion, now.stiffness
     reference.rows[[8, 9, 14]] = matrices[:, [0, 1, 0], [0, 1, 1]].T
     openings = CartesianBackstepping(rig, sign_width=WIDTH).command(measured, reference)
-    free = np.abs(openings).max(axis=0) < 1
+    free = rigid_body.rendered(openings, rig)
     assert free.sum() > 0.7 * lanes
 
-    coulomb = np.array([[rig.cylinder1.coulomb_friction], [rig.cylinder2.coulomb_friction]])
-    drag = -coulomb * now.speed / np.hypot(now.speed, WIDTH)
+    drag = -np.array(derived_law.coulomb_levels(now.pressures, now.speed, rig)) * now.speed / np.hypot(now.speed, WIDTH)
     a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, drag, np.zeros((2, lanes)))
     gain = np.array([np.real(sqrtm(one)) for one in 3 * matrices / mass - 2 * np.eye(2)])
     inverse = np.linalg.inv(rigid_body.jacobians(now.piston, rig))
@@ -87,15 +86,19 @@ def rendered(law: Controller, rig: Parameters, matrices: Array, pushed: float = 
     return np.linalg.inv(compliance.transpose(1, 2, 0, 3))
 
 
-def test_rendered_matrices_on_the_frictionless_plant(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every entry within 2 % of the setpoint's norm; measured: 0.014 %. (18), which drops the coupling, is 35 % off."""
+@pytest.mark.parametrize(("rig", "bound"), [(IDEAL, 0.0005), (FRICTIONLESS, 0.06)], ids=["linear valves", "catalogue"])
+def test_rendered_matrices_on_the_frictionless_plant(rig: Parameters, bound: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every entry within ``bound`` of the setpoint's norm; (18), which drops the coupling, is 35 % off.
+
+    Measured: 0.014 %, and 3 % with the catalogue's valves, whose overlap the law crosses softly.
+    """
     closed_loop.shorten_probes(monkeypatch)
     matrices = np.array(MATRICES)
     norms = np.linalg.norm(matrices, axis=(1, 2))[:, None, None]
-    ours = np.abs(rendered(CartesianBackstepping(FRICTIONLESS), FRICTIONLESS, matrices) - matrices) / norms
-    assert ours.max() < 0.0005
-    paper = BacksteppingController(FRICTIONLESS, weight_compensation=True)
-    theirs = np.abs(rendered(paper, FRICTIONLESS, matrices) - matrices) / norms
+    ours = np.abs(rendered(CartesianBackstepping(rig), rig, matrices) - matrices) / norms
+    assert ours.max() < bound
+    paper = BacksteppingController(rig, weight_compensation=True)
+    theirs = np.abs(rendered(paper, rig, matrices) - matrices) / norms
     assert np.all(theirs[:, [0, 1, 4]].max(axis=(2, 3)) > 0.1), "coupled setpoints"
     assert theirs.max() > 0.3, "measured: 0.35"
 

@@ -9,7 +9,7 @@ from baselines.backstepping.gains import gains_for, least_damping, least_stiffne
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
-from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles.closed_loop import FRICTIONLESS, IDEAL
 from tests.oracles.gain_range import closed_loop_damping, closed_loop_stiffness, damping_range
 
 MASS = 3.0
@@ -77,11 +77,14 @@ def test_gains_miss_where_they_render_another_damping_by_more_than_a_millionth()
 
 @pytest.mark.parametrize(("ratio", "tolerance"), [(0.9, 0.045), (1.3, 0.025)])
 def test_stiffness_and_damping_asked_for_are_rendered(ratio: float, tolerance: float) -> None:
-    """A growing force is followed at the speed of K and late by B/K; in the mean of both ways the linkage's turning cancels."""
+    """A growing force is followed at the speed of K and late by B/K; in the mean of both ways the linkage's turning cancels.
+
+    Linear valves: across an overlap the force hunts slowly (``test_rendered_stiffness``), and half a second has no steady lag.
+    """
     probes, speed = closed_loop.pushes((1.0, -1.0)), 0.003
-    law = BacksteppingController(FRICTIONLESS, weight_compensation=True, damping_ratio=ratio)
+    law = BacksteppingController(IDEAL, weight_compensation=True, damping_ratio=ratio)
     reference, growth = closed_loop.holding(probes.position, probes.stiffness[0]), speed * probes.stiffness[0] * probes.force
-    plant, path = closed_loop.resting_at(reference, FRICTIONLESS), []
+    plant, path = closed_loop.resting_at(reference, IDEAL), []
     for time, _, _, _ in closed_loop.run(plant, law.command, lambda t: reference, lambda t: growth * t, 2.0):
         if time >= 1.5:
             path.append(((plant.end_effector()[:2] - reference.position) * probes.force).sum(axis=0))
@@ -89,7 +92,7 @@ def test_stiffness_and_damping_asked_for_are_rendered(ratio: float, tolerance: f
     times = 1.5 + 0.001 * np.arange(len(path)) - 0.0005
     slope, start = np.polyfit(times, np.reshape(path, (len(path), -1, 2)).mean(axis=2), 1)
     setpoints = probes.stiffness[0, ::2]
-    damping = 2 * ratio * np.sqrt(FRICTIONLESS.mechanics.mass * setpoints)
+    damping = 2 * ratio * np.sqrt(IDEAL.mechanics.mass * setpoints)
     np.testing.assert_allclose(setpoints * speed / slope, setpoints, rtol=0.005)
     np.testing.assert_allclose(-start / slope * setpoints, damping, rtol=tolerance)
 

@@ -10,8 +10,9 @@ from baselines.valve_inverse import CylinderAir, force_first_openings, two_valve
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law
+from tests.oracles.closed_loop import AT_ONCE
 
-RIG = Parameters()
+RIG = Parameters().replace(AT_ONCE)
 LENGTH = RIG.cylinder2.stroke
 
 
@@ -123,6 +124,6 @@ def survived(name: str, world: int) -> float:
 
 
 def test_a_push_that_empties_both_chambers_under_the_papers_law_is_held() -> None:
-    """4 kg where 3 are believed, a hand pulls with 35 N at 1102 N/m: found among random circles."""
-    assert 9.0 < survived("backstepping", 120061) < 10.5
-    assert survived("backstepping-force-first", 120061) == np.inf
+    """3.4 kg where 3 are believed, a hand pulls with 39 N at 1269 N/m: the one of 2048 random circles that is lost."""
+    assert 7.0 < survived("backstepping", 118) < 8.0
+    assert survived("backstepping-force-first", 118) == np.inf

@@ -14,7 +14,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
-from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles.closed_loop import FRICTIONLESS, IDEAL
 from tests.oracles.strict_feedback import strict_feedback_rates
 
 LANES, STEP = 4, 2e-4
@@ -116,8 +116,9 @@ def test_its_errors_are_those_of_the_derivation() -> None:
     got = LyapunovFunction(BacksteppingController(rig, **options)).evaluate(measured(x, rig), reference)  # type: ignore[arg-type]
     gains = derived.gains_for(x[[4, 0]], reference.stiffness, rig)
     wanted = BacksteppingController(rig).inspect(measured(x, rig), reference).wanted
+    levels = derived.coulomb_levels(derived.air_for(x[[6, 2]], x[[7, 3]], x[[4, 0]], rig), x[[5, 1]], rig)
     found = derived.errors_and_rates()[0](
-        *x[[4, 0]], *x[[5, 1]], *x[[6, 2]], *wanted, *gains, 0.0, 0.0, *derived.rig_values(rig, 0.01, True)
+        *x[[4, 0]], *x[[5, 1]], *x[[6, 2]], *wanted, *gains, 0.0, 0.0, *derived.rig_values(rig, 0.01, True, coulomb=levels)
     )
     for i, (z1, z2, z3, g) in enumerate(found):
         np.testing.assert_allclose(got.errors[:3, i], [z1, z2, g * z3], rtol=1e-9)
@@ -126,16 +127,20 @@ def test_its_errors_are_those_of_the_derivation() -> None:
 
 
 @pytest.mark.parametrize("valves", ["two_valves", "one_valve"])
-def test_along_a_run_on_the_plant(valves: str) -> None:
-    """A step of 3 mm on both axes, without dry friction: V, with all that the model leaves out, falls by four decades."""
-    law = BacksteppingController(FRICTIONLESS, weight_compensation=True, valves=valves)
+@pytest.mark.parametrize(("rig", "left"), [(IDEAL, 1e-4), (FRICTIONLESS, 5e-3)], ids=["linear valves", "catalogue"])
+def test_along_a_run_on_the_plant(rig: Parameters, left: float, valves: str) -> None:
+    """A step of 3 mm on both axes, without dry friction: V, with all that the model leaves out, falls by four decades.
+
+    Valves with an overlap, which the law crosses softly, leave the force an error: two to three decades.
+    """
+    law = BacksteppingController(rig, weight_compensation=True, valves=valves)
     position = np.array([[0.5, 0.45], [0.0, 0.05]])
-    plant = closed_loop.resting_at(closed_loop.holding(position, 2000.0), FRICTIONLESS)
+    plant = closed_loop.resting_at(closed_loop.holding(position, 2000.0), rig)
     function, reference, path = LyapunovFunction(law), closed_loop.holding(position + 0.003, 2000.0), []
     for time, wanted, push, _ in closed_loop.run(plant, law.command, lambda t: reference, lambda t: np.zeros((2, 2)), 0.5):
         path.append(function.evaluate(closed_loop.ideal(plant, time, push), wanted))
     v, rate = np.array([value.value for value in path]), np.array([value.rate for value in path])
-    assert np.all(v[-1] < 1e-4 * v[0])
+    assert np.all(v[-1] < left * v[0])
     assert np.all(rate <= 0)
     assert np.all(np.array([value.errors[3] for value in path])[-1] == 0) == (valves == "one_valve")
 

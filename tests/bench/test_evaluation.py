@@ -100,16 +100,17 @@ def test_figures_are_those_of_the_environment_step_by_step(name, good):
 
 @pytest.mark.parametrize(
     ("name", "seeds", "sensors"),
-    [("pid", (11, 12, 13), "honest"), ("admittance-adaptive", (5, 6), "lab"), ("lqr", (5, 6), "ideal")],
+    [("pid[damping=0.01]", (11, 12, 13), "honest"), ("admittance-adaptive", (5, 6), "lab"), ("lqr", (5, 6), "ideal")],
 )
 def test_a_law_in_the_loop_has_the_figures_of_one_that_is_called_back(name, seeds, sensors):
+    """Also of an episode that is lost, as it is by a law with hardly any damping."""
     settings = {"seed": seeds[0], "episodes": len(seeds), "sensors": sensors, "duration": 4.0, "env": CIRCLE}
     inside = run(make_controller(name, RIG), **settings)
     called = run(spy := Spy(make_controller(name, RIG)), **settings)
     for what in ("seeds", "lost", "metrics", "returns", "success", "traces"):
         np.testing.assert_equal(getattr(inside, what), getattr(called, what), err_msg=what)
     assert spy.calls == 4000
-    assert sum(inside.lost) == (name == "pid")
+    assert any(inside.lost) or not name.startswith("pid")
 
 
 def test_a_class_that_changes_command_is_called_back():

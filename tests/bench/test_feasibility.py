@@ -68,15 +68,19 @@ def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_i
 
 
 def test_moving_takes_inertia_and_friction():
+    """Seals are pressed as at full strength: by the supply's pressure in one chamber."""
     rig = RIG.replace({"cylinder2.viscous_friction": 60.0, "mechanics.mass": 4.0})
     env = made(1, reference=Circle(radius=0.06, period=2.0), parameters=rig, duration=2.0)
     centre, rate, most = np.array([0.5, 0.0]), 2 * np.pi / 2.0, 0.0
+    supply, atmosphere = rig.air.supply_pressure, rig.air.atmospheric_pressure
+    pressures = [supply, atmosphere, supply, atmosphere]
     for time in np.arange(0.0, 2.0, 0.05):
         way = np.array([np.cos(rate * time), np.sin(rate * time)])
         columns = columns_at(centre + 0.06 * way, rig)
         speed = np.linalg.solve(columns, 0.06 * rate * np.array([-way[1], way[0]]))
         needed = columns.T @ (4.0 * (-0.06 * rate**2 * way + [0.0, 9.81]))
-        needed += [35.0, 60.0] * speed + 12.0 * np.sign(speed)
+        friction = np.array(derived.coulomb_levels(pressures, speed, rig))
+        needed += [35.0, 60.0] * speed + friction * np.sign(speed)
         most = max(most, fraction(needed, rig))
     np.testing.assert_allclose(required_strength_ratio(env), most, rtol=1e-9)
 

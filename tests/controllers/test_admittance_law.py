@@ -7,14 +7,14 @@ from baselines.admittance import law
 from baselines.admittance.controller import AdmittanceController
 from baselines.admittance.rows import Estimate, Gains, HalfWave, Memory
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.controllers.test_admittance_backstepping import PERIOD, TIMES, answer, commanded, near, remembered
+from tests.controllers.test_admittance_backstepping import PERIOD, RIG, TIMES, answer, commanded, near, remembered
 from tests.oracles import closed_loop, rigid_body
 from tests.oracles import derived_law as derived
 
 
 def test_the_pneumatic_stiffness_goes_where_the_reference_asks_at_c4() -> None:
     """dK/dt of the chambers is the reference's rate less 30 1/s times the error, of each cylinder, beside the force."""
-    rig, lanes, rng = Parameters(), 40, np.random.default_rng(3)
+    rig, lanes, rng = RIG, 40, np.random.default_rng(3)
     now = rigid_body.near_balance(rig, lanes, seed=7, speed=0.02, push=1.0)
     nothing = np.zeros((2, lanes))
     error, rate = rng.uniform(-20, 20, (2, lanes)), rng.uniform([[-300.0], [400.0]], [[-100.0], [700.0]], (2, lanes))
@@ -88,7 +88,7 @@ def test_a_motion_goes_somewhere_by_the_square_of_its_mean_velocity_over_8_mm_s(
 
 @pytest.mark.parametrize(("mean", "gone"), [(0.0, 0.0), (0.004, 0.25), (0.02, 1.0)])
 def test_the_gain_is_calmed_as_far_as_the_motion_goes_nowhere(mean: float, gone: float) -> None:
-    rig, c, memory = Parameters(), 50.0, remembered(1)
+    rig, c, memory = RIG, 50.0, remembered(1)
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
     pose, follower = rigid_body.pose_of(now.piston, rig), memory.follower
     follower.drift[:, 0] = 0.6 * mean, -0.8 * mean
@@ -110,7 +110,7 @@ def test_observers_are_told_what_was_commanded() -> None:
 
 
 def test_position_errors_count_up_to_six_millimetres() -> None:
-    rig = Parameters().replace({"valves.sonic_conductance": 2e-8})
+    rig = RIG.replace({"valves.sonic_conductance": 2e-8})
     now, nothing = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0), np.zeros((2, 1))
     jerks = []
     for error in (0.0059, 0.006, 0.0061, 0.05):

@@ -7,6 +7,7 @@ from baselines.admittance.controller import AdmittanceController
 from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.servovalves import LINEAR, MPYE_5_M5, Curve
 from tests.oracles import closed_loop
 
 BELIEVED = Parameters()
@@ -18,13 +19,25 @@ def errors(probes: StiffnessTest, answers: StiffnessResult) -> tuple[Array, Arra
 
 
 @pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
-def test_exact_sensors_and_friction_off_by_a_quarter(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """5 and 40 N at five poses, 1000-4000 N/m: measured 0.013 % and 0.0006 mm, with LuGre's drift and without."""
+@pytest.mark.parametrize(
+    ("curve", "most_error", "most_hunting"),
+    [(LINEAR, 0.002, 0.01), (MPYE_5_M5, 0.02, 0.025)],
+    ids=["linear valves", "catalogue"],
+)
+def test_exact_sensors_and_friction_off_by_a_quarter(
+    curve: Curve, most_error: float, most_hunting: float, law: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """5 and 40 N at five poses, 1000-4000 N/m, with LuGre's drift and without; with linear valves measured 0.013 %, 0.0006 mm.
+
+    The catalogue's, whose overlap is crossed softly: worst 0.84 %, 95 % within 0.17 %; 0.011 mm.
+    """
     closed_loop.shorten_probes(monkeypatch)
-    probes = closed_loop.pushes((5.0, -40.0), rigs=[closed_loop.slippery(scale, law) for scale in (0.75, 1.25)])
-    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False)))
-    assert error.max() < 0.002
-    assert hunting.max() < 0.01
+    rigs = [closed_loop.slippery(scale, law).replace(curve.changes()) for scale in (0.75, 1.25)]
+    probes, believed = closed_loop.pushes((5.0, -40.0), rigs=rigs), BELIEVED.replace(curve.changes())
+    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceController(believed, learn=False)))
+    assert np.quantile(error, 0.95) < 0.005
+    assert error.max() < most_error
+    assert hunting.max() < most_hunting
 
 
 @pytest.mark.parametrize(
@@ -39,12 +52,16 @@ def test_exact_sensors_and_friction_off_by_a_quarter(law: str, monkeypatch: pyte
     ],
 )
 def test_a_trackers_samples(law: str, forces: tuple[float, ...], seed: int) -> None:
-    """The rig as believed; over 1920 pushes: median 0.12 %, 95 % 0.61 %, worst 2.3 %; hunting 0.42 mm."""
+    """The rig as believed; over 960 pushes: median 0.34 %, 95 % 2.3 %, worst 6.2 % (elasto-plastic: 12 %); hunting 0.49 mm.
+
+    Linear valves have 0.1 %, 0.6 % and 2.3 %: noise throws the valves across their overlap all the time.
+    """
     probes = closed_loop.pushes(forces, rigs=[closed_loop.slippery(1.0, law)])
     error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False), "lab", seed=seed))
-    assert np.quantile(error, 0.95) < 0.01
-    assert error.max() < 0.05
-    assert hunting.max() < 0.5
+    assert np.median(error) < 0.007
+    assert np.quantile(error, 0.95) < 0.05
+    assert error.max() < 0.2
+    assert hunting.max() < 0.8
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])

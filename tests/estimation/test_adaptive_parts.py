@@ -15,6 +15,7 @@ from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.oracles.derived_law import coulomb_levels
 
 PERIOD = 1e-3
 AIR = np.full((4, 1), 4e5)
@@ -139,7 +140,8 @@ def test_the_hand_is_found_from_what_the_force_balance_leaves(slides):
         push = hand if k >= 500 else np.zeros(2)
         left = np.array([mechanics.user_force1(*push, kappa, sine, cosine), mechanics.user_force2(*push, sine, cosine)])
         # Unknown friction is what the fraction leaves out of the believed one.
-        left -= force_observer.FRICTION_FRACTION * np.array([p.fc1, p.fc2]) * np.sign(moved)
+        coulomb = np.array(coulomb_levels(AIR[:, 0], (moved, moved), Parameters()))
+        left -= force_observer.FRICTION_FRACTION * coulomb * np.sign(moved)
         joints = np.array([*y, moved, moved])[:, None]
         force_observer.observe(found, np.array([k * PERIOD]), Joints(joints), AIR, left[:, None], p, PERIOD, fresh)
         fresh[:] = 0.0

@@ -72,9 +72,12 @@ def test_gradients_are_numbers_where_episodes_begin() -> None:
 
 
 def test_observations_state_and_motion_have_gradients() -> None:
-    """Openings drive pistons: what an observed error, the true place and a piston say of it is the same."""
+    """Openings drive pistons: what an observed error, the true place and a piston say of it is the same.
+
+    Openings beyond the overlap: within it no flow follows them, and gradients are zero.
+    """
     env = lanes_of(40)
-    back = env.simulation.vjp(np.zeros((4, 40)))
+    back = env.simulation.vjp(np.full((4, 40), 0.2))
     seen, motion = np.zeros(env.observation_space.shape), np.zeros((4, 40))
     seen[:, 0], motion[0] = 0.01, 1.0
     _, by_observed = back(observation=seen)
@@ -92,7 +95,7 @@ def test_threads_change_no_bit() -> None:
     for threads in (1, 2):
         env = lanes_of(100, num_threads=threads)
         recorder = Recorder(env.simulation)
-        env.step(np.full((100, 4), 0.03))
+        env.step(np.full((100, 4), 0.2))
         found.append(recorder.taken()(reward=np.ones(100)))
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)

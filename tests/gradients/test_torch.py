@@ -28,18 +28,18 @@ def test_a_loss_of_ones_own_goes_back_through_the_loop() -> None:
             now = worlds.step(now, openings)
         return now.motion[0].sum() * 1e3
 
-    openings = torch.full((3, 4), 0.05, requires_grad=True)
+    openings = torch.full((3, 4), 0.2, requires_grad=True)
     place(openings).backward()
     way = np.random.default_rng(0).standard_normal((3, 4)).astype(np.float32)
-    ends = [float(place(openings.detach() + size * torch.from_numpy(way))) for size in (1e-3, -1e-3)]
-    assert float((openings.grad * torch.from_numpy(way)).sum()) == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-3)
+    ends = [float(place(openings.detach() + size * torch.from_numpy(way))) for size in (3e-4, -3e-4)]
+    assert float((openings.grad * torch.from_numpy(way)).sum()) == pytest.approx((ends[0] - ends[1]) / 6e-4, rel=1e-3)
 
 
 def test_the_end_of_an_episode_cuts_gradients() -> None:
     """A new episode owes nothing to the actions of the one before; the last reward of that one does."""
     worlds = worlds_of(2, duration=0.02)
     now = worlds.reset(seed=1)
-    actions = [torch.full((2, 4), 0.05, requires_grad=True) for _ in range(3)]
+    actions = [torch.full((2, 4), 0.2, requires_grad=True) for _ in range(3)]
     for k, action in enumerate(actions):
         now = worlds.step(now, action)
         assert bool(now.ended.all()) == (k == 1)
@@ -57,7 +57,7 @@ def test_the_last_step_of_an_episode_has_the_gradients_of_any_other() -> None:
     found = []
     for steps in (1, 2):
         worlds = worlds_of(3, randomize=True, max_episode_steps=steps)
-        action = torch.full((3, 4), 0.05, requires_grad=True)
+        action = torch.full((3, 4), 0.2, requires_grad=True)
         now = worlds.step(worlds.reset(seed=1), action)
         assert bool(now.ended.all()) == (steps == 1)
         now.reward.sum().backward()
@@ -67,10 +67,11 @@ def test_the_last_step_of_an_episode_has_the_gradients_of_any_other() -> None:
 
 
 @pytest.mark.slow
-def test_the_example_learns_in_a_hundred_updates() -> None:
-    errors = run_path(f"{ROOT}/examples/gradients.py")["train"](120)
+def test_the_example_learns_in_two_hundred_updates() -> None:
+    """Shut valves, at which it begins, leave 3 to 5 mm once hands push."""
+    errors = run_path(f"{ROOT}/examples/gradients.py")["train"](200)
     assert np.median(errors[-20:]) < 1.5
-    assert np.median(errors[:20]) > 3.0
+    assert np.median(errors[20:60]) > 3.0
 
 
 @pytest.mark.parametrize("sensors", ["ideal", pytest.param("honest", marks=pytest.mark.slow)])
@@ -80,7 +81,7 @@ def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str
     for place in ("cpu", device):
         worlds = worlds_of(5, randomize=True, max_episode_steps=3, sensors=sensors, device=place)
         now, loss = worlds.reset(seed=1, options={"staggered": True}), 0.0
-        actions = 0.1 * torch.sin(torch.arange(100.0).reshape(5, 5, 4))
+        actions = 0.4 * torch.sin(torch.arange(100.0).reshape(5, 5, 4))
         actions.requires_grad = True
         for action in actions:
             now = worlds.step(now, action.to(now.reward.device))

@@ -14,6 +14,7 @@ from lab.studies.bandwidth.valves import commanded_openings
 from lab.studies.haptics.recording import record
 from lab.studies.haptics.worlds import POSES, Condition, resting
 from lab.studies.stability.rig_port import RigPort
+from tests.oracles.closed_loop import IDEAL
 
 
 def test_there_are_twenty_lines_a_decade():
@@ -50,7 +51,7 @@ def test_an_impedance_is_that_of_a_port_recorded():
 @pytest.mark.parametrize("hertz", [2.0, 8.0])
 def test_openings_of_a_push_along_a_cylinder_without_friction(hertz):
     """Along cylinder 2 its pressures carry -(K + jw (B - Fv)) X, of which w X/C of the flow follows by hand."""
-    rig = Parameters().replace({f"cylinder{k}.coulomb_friction": 0.0 for k in (1, 2)} | {"mechanics.gravity": 0.0})
+    rig = IDEAL.replace({"mechanics.gravity": 0.0})
     pose = np.array(POSES[1])
     direction, reference = (pose / np.hypot(*pose))[:, None], resting([tuple(pose)], [2000.0])
     declared = mass_spring_damper(reference, rig.mechanics.mass, 0.7)

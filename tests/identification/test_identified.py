@@ -60,7 +60,7 @@ def test_what_was_left_out_stands_in_the_file_of_the_rig(tmp_path):
     [
         ("mechanics.mass", (2.0, 5.0), (1.4, 7.0)),
         ("electronics.position_latency", (0.002, 0.015), (0.018,)),
-        ("valves.time_constant", (0.0015, 0.008), (0.012,)),
+        ("valves.time_constant", (0.0012, 0.008), (0.012,)),
     ],
 )
 def test_a_rig_for_which_no_controller_is_tuned_is_named(name, inside, outside):

@@ -15,15 +15,28 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-
-FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
-"""Neither Coulomb nor Stribeck friction; the viscous part stays."""
+from birthsim_env.physics.rig.servovalves import LINEAR
 
 
 def slippery(scale: float, law: str = "lugre") -> Parameters:
-    """The rig with ``scale`` times its Coulomb friction, 12 and 15 N."""
-    coulomb = {"cylinder1.coulomb_friction": 12.0 * scale, "cylinder2.coulomb_friction": 15.0 * scale}
-    return Parameters().replace({**coulomb, "friction.law": law})
+    """The rig with ``scale`` times its Coulomb friction, of seals without pressure and of what pressure adds."""
+    rig = Parameters()
+    levels = {
+        f"cylinder{k}.{part}_friction": scale * getattr(cylinder, f"{part}_friction")
+        for k, cylinder in ((1, rig.cylinder1), (2, rig.cylinder2))
+        for part in ("coulomb", "pressure")
+    }
+    return rig.replace({**levels, "friction.law": law})
+
+
+FRICTIONLESS = slippery(0.0)
+"""Neither Coulomb nor Stribeck friction; the viscous part stays."""
+
+IDEAL = FRICTIONLESS.replace(LINEAR.changes())
+"""``FRICTIONLESS`` with linear valves: a law whose crossing of an overlap takes time renders its setpoints less exactly."""
+
+AT_ONCE = {"valves.crossing": 1e-4}
+"""Overlaps that a law crosses at a ten thousandth of full flow: what flows is what it wants at nearly all times."""
 
 
 PNEUMATIC_STIFFNESS = np.array([[4400.0], [2200.0]])

@@ -83,13 +83,28 @@ def errors_and_rates() -> tuple[Callable[..., Any], Callable[..., Any]]:
     return sp.lambdify(arguments, errors, cse=True), sp.lambdify([*arguments, *BELIEVED_RATE], rates, cse=True)
 
 
-def rig_values(rig: Parameters, width: float, compensate: bool, frozen: bool = False) -> list[float]:
-    """Values of ``RIG``; ``frozen`` leaves the Coulomb friction out of dF*/dt."""
+def coulomb_levels(pressures: Any, speed: Any, rig: Parameters) -> list[Any]:
+    """Coulomb friction of both pistons, N, at the pressures of chambers P1, N1, P2, N2 and the way in which each moves."""
+    levels = []
+    for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+        gauge = pressures[2 * i] + pressures[2 * i + 1] - 2 * rig.air.atmospheric_pressure
+        way = np.where(np.asarray(speed[i]) > 0, 1, -1)
+        pressed = np.maximum(cylinder.coulomb_friction + cylinder.pressure_friction * gauge, 0)
+        levels.append(pressed * (1 + cylinder.direction_asymmetry * way))
+    return levels
+
+
+def rig_values(rig: Parameters, width: float, compensate: bool, frozen: bool = False, coulomb: Any = (None, None)) -> list[Any]:
+    """Values of ``RIG``; ``frozen`` leaves the Coulomb friction out of dF*/dt.
+
+    ``coulomb`` are the ``coulomb_levels`` at hand, which laws take as constant in dF*/dt; else those of seals without pressure.
+    """
     g, c1, c2 = rig.geometry, rig.cylinder1, rig.cylinder2
+    levels = [c.coulomb_friction if level is None else level for c, level in zip((c1, c2), coulomb, strict=True)]
     rod = [rig.air.atmospheric_pressure * math.pi / 4 * c.rod_diameter**2 for c in (c1, c2)]
     return [
         rig.mechanics.mass, rig.mechanics.gravity, g.d3, g.d6, g.gamma3, g.k1, g.k2, *rod,
-        c1.coulomb_friction, c2.coulomb_friction, c1.viscous_friction, c2.viscous_friction,
+        *levels, c1.viscous_friction, c2.viscous_friction,
         width, float(compensate), float(not frozen),
     ]  # fmt: skip
 
@@ -181,12 +196,21 @@ def net_flow(opening: float, pressure: float, rig: Parameters) -> float:
     return supplied - orifice(leaving, pressure, rig.air.atmospheric_pressure, rig)
 
 
-def opening_for(flow: float, pressure: float, rig: Parameters) -> float:
+def exact_opening_for(flow: float, pressure: float, rig: Parameters) -> float:
     """Root of the characteristic, or the limit where the valve cannot carry the flow."""
     least, most = (net_flow(s, pressure, rig) for s in (-1.0, 1.0))
     if not least < flow < most:
         return 1.0 if flow >= most else -1.0
     return float(brentq(lambda s: net_flow(s, pressure, rig) - flow, -1, 1, xtol=1e-13, rtol=1e-14))
+
+
+def opening_for(flow: float, pressure: float, rig: Parameters) -> float:
+    """``exact_opening_for`` less the part of the overlap that a controller leaves out while it crosses it (docs/valves.md)."""
+    v, exact = rig.valves, exact_opening_for(flow, pressure, rig)
+    supply, exhaust = (v.supply_overlap, v.supply_curvature, 1.0), (v.exhaust_overlap, v.exhaust_curvature, v.exhaust_ratio)
+    edge = np.array(supply if exact > 0 else exhaust)
+    left_out = edge[0] * max(1 - second_model.opened(abs(exact), edge) / v.crossing, 0) ** 2
+    return exact - math.copysign(left_out, exact)
 
 
 def pressures_for(force: Any, stiffness: Any, y: Any, cylinder: Cylinder, rig: Parameters) -> Array:
@@ -230,10 +254,14 @@ def seen(piston: Array, speed: Array, pressures: Array, rig: Parameters) -> Meas
     return Measurement(clock, pose.end_effector, clock, velocity, pressures, np.zeros(piston.shape), sampled=False)
 
 
-def accelerations(rig: Parameters, width: float, compensate: bool) -> Callable[..., Any]:
-    """(13), or (5) with compensation, as a function of ``STATE``: dv1/dt and dv2/dt without a force that is only believed."""
+def accelerations(rig: Parameters, width: float, compensate: bool, coulomb: Any = (None, None)) -> Callable[..., Any]:
+    """(13), or (5) with compensation, as a function of ``STATE``: dv1/dt and dv2/dt without a force that is only believed.
+
+    ``coulomb`` as in ``rig_values``.
+    """
     f1, g1, f2, g2 = (e.subs(dict.fromkeys(BELIEVED, 0)) for e in model_13())
-    function, values = sp.lambdify([*STATE, *RIG], [f1 + g1 * F1, f2 + g2 * F2], cse=True), rig_values(rig, width, compensate)
+    function = sp.lambdify([*STATE, *RIG], [f1 + g1 * F1, f2 + g2 * F2], cse=True)
+    values = rig_values(rig, width, compensate, coulomb=coulomb)
     return lambda *state: function(*state, *values)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.compiled.lanes import Array
@@ -36,6 +37,16 @@ def jacobians(piston: Array, rig: Parameters) -> Array:
     pose, r2 = pose_of(piston, rig), piston[1] + rig.geometry.k2
     columns = [by_points.cartesian_velocity(pose, r2, 1.0 - i, float(i))[0] for i in range(2)]
     return np.stack(columns, axis=1).transpose(2, 0, 1)
+
+
+def rendered(openings: Array, rig: Parameters) -> NDArray[np.bool_]:
+    """Lanes, (N,), whose ``openings`` (4, N) give the forces that a law asks for.
+
+    One valve of a cylinder that saturates takes from the pneumatic stiffness alone; one amid its overlap lets less through.
+    """
+    sizes, crossed = np.abs(openings), rig.valves.supply_overlap + rig.valves.crossing
+    has_force = sizes.reshape(2, 2, -1).min(axis=1) < 1 - 1e-9
+    return np.asarray(has_force.all(axis=0) & ((sizes > crossed) | (sizes < 1e-9)).all(axis=0))
 
 
 def rod_forces(rig: Parameters) -> Array:

@@ -81,8 +81,8 @@ POWERS = np.array([[0.5, -0.5, 0.5, 0.0, 0.4], [0.5, -0.5, -0.3, 0.0, 0.0]])
 
 def pushed(damping: float, sensed: bool, push: float, seconds: float = 2.5) -> Array:
     """Displacement (axis, N), m, from a target at rest at 2000 N/m that a hand pushes with ``push`` N on one axis, on the rig
-    without dry friction and with ``POWERS``; the force sensor works only where ``sensed``."""
-    rig, lanes = closed_loop.FRICTIONLESS, 2 * POWERS.shape[1]
+    with linear valves, without dry friction and with ``POWERS``; the force sensor works only where ``sensed``."""
+    rig, lanes = closed_loop.IDEAL, 2 * POWERS.shape[1]
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), 2000.0)
     plant = closed_loop.resting_at(wanted, rig)
     law = CorrectedController(rig, ResidualSettings("backstepping-weight", "variable"))

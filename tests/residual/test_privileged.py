@@ -21,19 +21,34 @@ def test_as_described_nothing_is_special():
     np.testing.assert_array_equal(figures, np.tile([1.0] * (TRUE_PARAMETERS - 6) + [0.0] * 6, (LANES, 1)).astype(np.float32))
 
 
+def described(rig, names):
+    """What the owner describes, of the edges' curvatures the slopes."""
+    values = [getattr(getattr(rig, section), own) for section, own in (name.split(".") for name in names)]
+    overlap = dict(zip(names, values, strict=True))
+    for name, value in zip(names, values, strict=True):
+        beside = overlap.get(name.replace("curvature", "overlap"))
+        yield (1 + value) / (1 - beside) if name.endswith("curvature") else value
+
+
 def test_every_figure_of_the_rig_that_is_drawn_is_told():
     nominal, ranges = Parameters(), documented_ranges(Parameters())
     figures = true_parameters(make(randomize="plant")).T[:-6]
     names = (
-        "mechanics.mass", "cylinder1.coulomb_friction", "cylinder2.coulomb_friction", "cylinder1.viscous_friction",
-        "cylinder2.viscous_friction", "valves.time_constant", "chambers.dead_volume", "chambers.wall_heat_transfer",
+        "mechanics.mass", "cylinder1.coulomb_friction", "cylinder2.coulomb_friction", "cylinder1.pressure_friction",
+        "cylinder2.pressure_friction", "cylinder1.viscous_friction", "cylinder2.viscous_friction", "friction.bristle_stiffness",
+        "valves.time_constant", "chambers.dead_volume", "chambers.wall_heat_transfer",
+        "valves.supply_overlap", "valves.supply_curvature", "valves.exhaust_overlap", "valves.exhaust_curvature",
     )  # fmt: skip
     assert set(names) == set(ranges)
-    for name, row in zip(names, figures, strict=True):
-        section, own = name.split(".")
-        low, high = np.array(ranges[name]) / getattr(getattr(nominal, section), own)
-        assert low <= row.min() < row.max() <= high, name
-        assert np.ptp(row) > 0.8 * (high - low), name
+    told = dict(zip(names, figures * [[one] for one in described(nominal, names)], strict=True))
+    for side in ("supply", "exhaust"):
+        # Of an edge its slope is told.
+        told[f"valves.{side}_curvature"] = told[f"valves.{side}_curvature"] * (1 - told[f"valves.{side}_overlap"]) - 1
+    for name, row in told.items():
+        low, high = ranges[name]
+        assert low * (1 - 1e-5) <= row.min() < row.max() <= high * (1 + 1e-5), name
+        spread = np.log if name == "friction.bristle_stiffness" else np.asarray
+        assert np.ptp(spread(row)) > 0.8 * np.ptp(spread([low, high])), name
 
 
 def test_the_errors_of_honest_sensors_are_told():

@@ -23,13 +23,24 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
-from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles.closed_loop import IDEAL
 from tests.physics.rigs import TILTED
 
 PERIOD = 1e-3
 
 
-def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, force_rate: Array | float = 0.0) -> Array:
+MIDDLE = np.array([[3e5], [4e5], [5e5], [3.5e5]])
+"""Pa: pressures that press the seals."""
+
+
+def prepared(
+    joints: Array,
+    force: Array,
+    rig: Parameters,
+    fraction: float,
+    force_rate: Array | float = 0.0,
+    pressures: Array = MIDDLE,
+) -> Array:
     """What the stage finds needed, (5, N), for a motion of the joints (8, N); its jerk lacks the user's ``force_rate`` / m."""
     motion = derived.cartesian(joints, rig).rows[:8].copy()
     motion[6:8] -= force_rate / rig.mechanics.mass
@@ -38,6 +49,7 @@ def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, forc
     placed = [
         (motion, MOTION),
         (force.copy(), Seen.user_force.first),
+        (np.array(np.broadcast_to(pressures, (4, lanes))), Seen.pressure.first),
         (wanted, INTERMEDIATE + Tracking.wanted.first),
         (needed, INTERMEDIATE + Tracking.needed.first),
     ]
@@ -52,9 +64,10 @@ def test_the_needed_force_gives_the_wanted_acceleration(rig: Parameters) -> None
     rng, lanes, fraction = np.random.default_rng(1), 50, 0.6
     joints = rng.normal(0, 1, (8, lanes)) * np.repeat([0.03, 0.1, 1.0, 10.0], 2)[:, None]
     force = rng.normal(0, 30, (2, lanes))
-    needed = prepared(joints, force, rig, fraction)
-    believed = {f"{c}.coulomb_friction": fraction * getattr(rig, c).coulomb_friction for c in ("cylinder1", "cylinder2")}
-    acceleration = derived.accelerations(rig.replace(believed), SIGN_WIDTH, True)
+    pressures = rng.uniform(1.1e5, 6.9e5, (4, lanes))
+    needed = prepared(joints, force, rig, fraction, pressures=pressures)
+    believed = fraction * np.array(derived.coulomb_levels(pressures, joints[2:4], rig))
+    acceleration = derived.accelerations(rig, SIGN_WIDTH, True, believed)
     along = geometry.joint_force(force, joints[:2], rig)
     np.testing.assert_allclose(acceleration(*joints[:4], *(needed[:2] + along)), joints[4:6], atol=1e-9)
     columns = geometry.jacobian(joints[:2], rig)
@@ -220,8 +233,8 @@ def beside_rest(rig: Parameters, offset: Array) -> tuple[Array, Reference, Array
 
 
 def test_lqr_moves_the_control_model_as_its_linear_model_says() -> None:
-    """From 0.1 mm beside the target: every error follows exp((A - B k) t), sampled at 1 kHz."""
-    rig, tolerances = FRICTIONLESS, np.array([4e-4, 3e-3, 0.2, 20.0])
+    """From 0.1 mm beside the target: every error follows exp((A - B k) t), sampled at 1 kHz; valves are linear."""
+    rig, tolerances = IDEAL, np.array([4e-4, 3e-3, 0.2, 20.0])
     law = LinearQuadratic(
         rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)), friction_fraction=0.0, dead_zone=0.0
     )
@@ -244,8 +257,11 @@ def test_lqr_moves_the_control_model_as_its_linear_model_says() -> None:
 
 
 def test_sliding_mode_reaches_its_layer_when_predicted_and_decays_there() -> None:
-    """Weightless: |s| falls at h until h/b, in (|s0| - h/b)/h; then s decays at b, and errors as the triple pole at r."""
-    rig, r, reaching, inside = FRICTIONLESS.replace({"mechanics.gravity": 0.0}), 25.0, 15.0, 60.0
+    """Weightless: |s| falls at h until h/b, in (|s0| - h/b)/h; then s decays at b, and errors as the triple pole at r.
+
+    Of linear valves: others leave some of the flow out while they cross their overlap.
+    """
+    rig, r, reaching, inside = IDEAL.replace({"mechanics.gravity": 0.0}), 25.0, 15.0, 60.0
     law = SlidingMode(rig, surface_rate=r, reaching_rate=reaching, layer_rate=inside, friction_fraction=0.0, dead_zone=0.0)
     start, reference, _, scale = beside_rest(rig, np.array([-5e-4, 1.2e-3]))
     path = np.array(list(on_the_model(law, rig, start, reference, 0.7)))

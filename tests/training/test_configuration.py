@@ -11,7 +11,7 @@ import yaml
 
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration
-from agents.training.margin import widened
+from agents.training.margin import CALMING, EXCITING, widened
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios
 from birthsim_env.physics.rig.parameters import Parameters
@@ -100,8 +100,8 @@ MASSES, SLOWEST = (2.0, 5.0), 0.008
 def test_ranges_reach_further_on_one_side_and_an_owners_own_count() -> None:
     known, wide = documented_ranges(Parameters()), documented_ranges(widened(Parameters(), 0.5))
     assert wide["mechanics.mass"] == pytest.approx((MASSES[0] / 1.5, MASSES[1]))
-    assert wide["valves.time_constant"] == pytest.approx((0.0015, 1.5 * SLOWEST))
-    assert {name for name in known if wide[name] == known[name]} == {"chambers.dead_volume", "chambers.wall_heat_transfer"}
+    assert wide["valves.time_constant"] == pytest.approx((0.0012, 1.5 * SLOWEST))
+    assert {name for name in known if wide[name] != known[name]} == {*CALMING, EXCITING}
     rig = Parameters.from_dict({"randomize": {"mechanics.mass": [7.0, 10.0], "air.supply_pressure": [6e5, 7e5]}})
     ranges = documented_ranges(widened(rig, 0.25))
     assert ranges["mechanics.mass"] == (7.0 / 1.25, 10.0)

@@ -20,6 +20,7 @@ SHORT = TrainingSettings(
     hidden=(32, 32),
     validation_lanes=8,
     validations=2,
+    noise=0.08,
 )
 PURE = ResidualSettings(law="none", policy_period=0.02)
 BESIDE = replace(SHORT, target="impedance", beside=("BirthSIM/ProbeResidual-v3 guided",))
@@ -31,7 +32,7 @@ INFORMED = replace(PURE, informed=True)
 )
 def test_a_policy_from_scratch_learns_in_80_updates(settings, residual, most, tmp_path):
     reached = train(settings, residual, tmp_path)
-    # 1.3 to 4.6 mm, by the seed, where shut valves have 21.
+    # Shut valves leave 17 mm, and 8 mm of what the second one is for.
     assert reached["policy"]["pooled_mm"] < most * reached["law"]["pooled_mm"]
     assert reached["policy"]["lost"] == 0
     policy = read_policy(tmp_path)

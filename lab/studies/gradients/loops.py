@@ -14,8 +14,9 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.gradients.states import SCALES
 
-SIZES = (1e-5, 1e-6, 1e-7)
-"""Of the differences, in units of what actions and ``SCALES`` are changed by."""
+SIZES = (1e-6, 1e-7, 1e-8)
+"""Of the differences, in units of what actions and ``SCALES`` are changed by. Laws cross the overlap of valves in a steep
+curve, which larger ones cut off."""
 
 MOTIONS = np.array([0.01, 0.01, 0.1, 0.1])[:, None]
 """m and m/s: size of the end effector's changes."""
