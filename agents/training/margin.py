@@ -5,7 +5,10 @@ from dataclasses import replace
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
 
-CALMING = ("mechanics.mass", *(f"cylinder{k}.{kind}_friction" for k in (1, 2) for kind in ("coulomb", "viscous")))
+CALMING = (
+    "mechanics.mass",
+    *(f"cylinder{k}.{kind}_friction" for k in (1, 2) for kind in ("coulomb", "pressure", "viscous")),
+)
 """What less of makes a rig oscillate. It also asks for less force: on rigs that are too weak there is nothing to learn."""
 
 EXCITING = "valves.time_constant"
