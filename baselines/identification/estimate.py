@@ -20,7 +20,7 @@ from baselines.identification.offsets import Offsets
 from baselines.identification.robust import reweighted
 from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
-from baselines.identification.windows import FREE, Windows, cut
+from baselines.identification.windows import Windows, cut
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -66,11 +66,11 @@ class Problem:
         self.noise, self.free, self._owner, self._tick = noise, free, owner, tick
         self.centre, self.limits = coordinates(owner, free), limits(owner, free)
         self.spread: Array = np.array([one.prior.spread for one in free])
-        self._start: Array = np.zeros((len(windows.starts), len(FREE)))
+        self._start: Array = np.zeros((len(windows.starts), len(windows.free)))
         self._at: tuple[bytes, Array, Array, Array]
         self._slopes: Slopes | None
         self._take(windows)
-        self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(FREE)
+        self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(windows.free)
         self.derivatives: Array = np.empty(0)
 
     @property
@@ -89,7 +89,7 @@ class Problem:
         self._start = begun_anew(self.offsets.corrected(), self.noise, rig, self._start)
 
     def settled(self, theta: Array) -> tuple[Array, Array]:
-        """Start states (W, 14) and residuals (W, R + 14) at coordinates (Q,); NaN where the rig predicts no numbers."""
+        """Start states (W, F) and residuals (W, R + F) at coordinates (Q,); NaN where the rig predicts no numbers."""
         if self._at[0] != theta.tobytes():
             self._tick()
             before = self.offsets.sizes
@@ -153,11 +153,11 @@ class Problem:
         )
 
     def residuals(self, theta: Array) -> Array:
-        """All residuals, (W (R + 14) + E + Q,)."""
+        """All residuals, (W (R + F) + E + Q,)."""
         return np.concatenate([self.settled(theta)[1].ravel(), self._at[3], (theta - self.centre) / self.spread])
 
     def jacobian(self, theta: Array) -> Array:
-        """Their derivatives, (W (R + 14) + E + Q, Q), less what start states and offsets make up for: one lane a parameter and
+        """Their derivatives, (W (R + F) + E + Q, Q), less what start states and offsets make up for: one lane a parameter and
         window."""
         self._start, residual = self.settled(theta)
         slopes = self._linearize(self.rig_at(theta))
@@ -276,7 +276,7 @@ def _best_drawn(problem: Problem, rng: np.random.Generator) -> Array:
     owner's rig."""
     windows, count = problem.windows, len(problem.centre)
     thetas = np.clip(problem.centre + problem.spread * rng.normal(size=(DRAWN, count)), *problem.limits)
-    free = np.zeros((len(windows.starts), len(FREE)))
+    free = np.zeros((len(windows.starts), len(windows.free)))
     slopes = slopes_at(windows, problem.noise, problem.rig_at(problem.centre), free)
     rigs = [problem.rig_at(theta) for theta in thetas]
     found = predicted(windows, problem.noise, rigs, np.repeat(free[None], DRAWN, axis=0))

@@ -1,6 +1,6 @@
 """The whole identification of a trial: fit, certainty, a rig to write, and its description in words."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 
@@ -10,7 +10,8 @@ import tomli_w
 from baselines.identification.certainty import NORMAL, Certainty, certainty_of
 from baselines.identification.estimate import Fit, Tick, fit, refine
 from baselines.identification.force_offset import ForceOffset, force_offset
-from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY, FreeParameter
+from baselines.identification.forms import Suspect, shown, suspects
+from baselines.identification.free_parameters import LATENCY, FreeParameter, free_of, shown_by, with_more
 from baselines.identification.log_columns import CHAMBERS
 from baselines.identification.noise import LEAST, guessed_noise, noise_of
 from baselines.identification.starts import Noise
@@ -68,6 +69,8 @@ class Identified:
         A constant force that the log lacks.
     left_over : array (4,)
         Residuals of each chamber's pressures over the noise that third differences show.
+    suspects : tuple of Suspect
+        Forms that the log shows and the model lacks, the likeliest first.
 
     Examples
     --------
@@ -87,6 +90,7 @@ class Identified:
     notes: tuple[str, ...]
     pull: ForceOffset
     left_over: Array
+    suspects: tuple[Suspect, ...] = ()
 
     @property
     def misfit(self) -> tuple[float, float]:
@@ -104,7 +108,7 @@ class Identified:
                 "the model leaves more than noise: hands, an offset of the force sensor, leaks, play or a curve of the valves "
                 "that it does not know; see the residuals"
             )
-        lines += [*self._causes(), *self._unlike_valves()]
+        lines += [*self._causes(), *self._unlike_valves(), *(one.words for one in self.suspects)]
         if not self.fit.ended:
             lines.append("the search took all the evaluations that it may make, and may end before the best parameters")
         for row in self.rows:
@@ -164,19 +168,27 @@ MISFIT = 1.1
 UNLIKE = 1.25
 """A chamber is named whose residuals, over its noise, are so many times the median of all four; assumed."""
 
+MOST_FORMS = 2
+"""Times that forms are looked for which the log shows."""
+
 BIASED, LEAST_BIAS = 3.0, 5e3
 """Standard deviations and Pa from which the bias of a cell is named."""
 
 
-REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance", "mechanics.mode_frequency")
+REMEMBER = ("mechanics.mode_frequency",)
 """Options of a rig with states that no log holds at the start of a window."""
 
 
 def identify(
-    trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
+    trial: Trial,
+    owner: Parameters,
+    seed: int = 0,
+    free: tuple[FreeParameter, ...] | None = None,
+    tick: Tick = lambda: None,
 ) -> Identified:
     """The rig of a trial, as far as the trial determines it; all else is the owner's.
 
+    Without ``free``, what a rig as its owner's has is identified, and what else the log shows (``forms``).
     Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
     of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
     ``REMEMBER``.
@@ -184,9 +196,19 @@ def identify(
     given = [name for name in REMEMBER if value_of(owner, name)]
     if given:
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
-    whole = fit(trial, owner, seed, free, tick)
+    asked = free_of(owner) if free is None else free
+    whole = fit(trial, owner, seed, asked, tick)
+    more = () if free is not None else shown_by(owner)
+    for _ in range(MOST_FORMS):
+        with whole.problem.explained():
+            values = shown(whole, tuple(one for one in more if one not in whole.free))
+        if not values:
+            break
+        every = with_more(whole.free, (one for one in more if one.name in values))
+        whole = refine(trial, replace(whole, rig=whole.rig.replace(values)), owner, every, tick)
+    free = whole.free
     with whole.problem.explained():
-        certainty, pull = certainty_of(whole), force_offset(whole)
+        certainty, pull, others = certainty_of(whole), force_offset(whole), suspects(whole)
     found = tuple(one for one, known in zip(free, certainty.determined, strict=True) if known)
     last = whole if len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
     rig = last.rig if found else owner
@@ -202,7 +224,9 @@ def identify(
     changes = {row.name: row.value for row in rows if row.determined}
     noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
     rig, quick = owner.replace({**changes, **noise}), guessed_noise(trial)
-    return Identified(tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left_over(last, trial))
+    return Identified(
+        tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left_over(last, trial), tuple(others)
+    )
 
 
 def left_over(found: Fit, trial: Trial) -> Array:

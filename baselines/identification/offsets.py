@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from baselines.identification.starts import Noise, Slopes
-from baselines.identification.windows import FREE, Windows
+from baselines.identification.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.electronics import Electronics
 
@@ -44,11 +44,11 @@ class Offsets:
         field = np.einsum("wfe,ab->wfabe", terms, np.eye(2)).reshape(count, -1, 2 * len(POWERS))
         bias = np.tile(max(board.pressure_bias, LEAST) * np.eye(cells), (count, windows.length, 1))
         self._windows, self._bias, self._field = windows, bias, field
-        self._columns = np.zeros((count, bias.shape[1] + field.shape[1] + len(FREE), cells + field.shape[2]))
+        self._columns = np.zeros((count, bias.shape[1] + field.shape[1] + len(windows.free), cells + field.shape[2]))
         heard = windows.pressure_weights.reshape(count, -1, 1)
         seen = np.repeat(windows.position_weights, 2, axis=1)[..., None]
         self._columns[:, : bias.shape[1], :cells] = -heard * bias / noise.pressure
-        self._columns[:, bias.shape[1] : -len(FREE), cells:] = -seen * field / noise.position
+        self._columns[:, bias.shape[1] : -len(windows.free), cells:] = -seen * field / noise.position
         self.sizes: Array = np.zeros(self._columns.shape[2])
 
     @property
@@ -70,14 +70,14 @@ class Offsets:
         self._inverse = np.linalg.inv(tall.T @ tall + np.eye(tall.shape[1]))
 
     def step(self, residual: Array) -> float:
-        """A Gauss-Newton step for residuals (W, R + 14); its length in standard deviations."""
+        """A Gauss-Newton step for residuals (W, R + F); its length in standard deviations."""
         gradient = np.einsum("wre,wr->e", self._left, residual) + self.sizes
         step = -self._inverse @ gradient
         self.sizes = self.sizes + step
         return float(np.sqrt(-gradient @ step))
 
     def unexplained(self, columns: Array) -> tuple[Array, Array]:
-        """What the errors cannot explain of columns (W, R + 14, Q), and the columns of their ``sizes`` as residuals, (E, Q)."""
+        """What the errors cannot explain of columns (W, R + F, Q), and the columns of their ``sizes`` as residuals, (E, Q)."""
         along = self._inverse @ np.tensordot(self._left, columns, axes=((0, 1), (0, 1)))
         return columns - self._left @ along, -along
 

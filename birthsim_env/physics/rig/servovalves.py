@@ -140,6 +140,7 @@ class Valves(Section):
         option=True,
         range=(0.9, 1.1),
         on_request=True,
+        identified=Prior(1.0, scale=0.1, needs="exhaust_ratio"),
         row=None,
     )
     crossing: float = parameter(
@@ -161,6 +162,7 @@ class Valves(Section):
         option=True,
         range=(0, 0.02),
         on_request=True,
+        identified=Prior(2.0, scale=0.01, needs="hysteresis"),
         row="play",
     )
     opening_limit: float = parameter(
