@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
+from baselines.identification.beginnings import SHORT, best_drawn, spread_out
 from baselines.identification.budget import UnsettledError
 from baselines.identification.free_parameters import FREE_PARAMETERS, FreeParameter, coordinates, limits, rig_at
 from baselines.identification.noise import guessed_noise, noise_from
@@ -24,18 +25,15 @@ from baselines.identification.windows import Windows, cut
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
-SHORT, SOME = 0.1, 24
-"""s and number of the windows of the first search, assumed."""
-
-DRAWN = 48
-"""Rigs that are drawn to begin the first search at, assumed."""
-
 MOST = (25, 30)
 """Evaluations of the first and of the second search at most."""
 
 TOLERANCE = 1e-7
 """A search ends where a step lowers the cost, or moves the coordinates, by less than this fraction. The cost is some 3e4, of
 which 0.5 is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way."""
+
+GOOD = 1.1
+"""Residuals over the noise of neighbouring samples up to which a search has found the rig, and does not begin elsewhere too."""
 
 DIFFERENCE = 1e-5
 """Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
@@ -48,6 +46,9 @@ STILL, MOST_STEPS = 0.1, 6
 
 MOST_WEIGHTS = 3
 """Times that a search is repeated with new weights (``robust``) at most."""
+
+POOR = 2.0
+"""Residuals over the noise with which a search whose budget ends has found nothing; assumed."""
 
 NAMED = 3
 """Windows that are named where a search fails."""
@@ -72,6 +73,7 @@ class Problem:
         self._take(windows)
         self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(windows.free)
         self.derivatives: Array = np.empty(0)
+        self.last: tuple[Array, Array] | None = None
 
     @property
     def slopes(self) -> Slopes:
@@ -127,7 +129,7 @@ class Problem:
         return True
 
     def _take(self, windows: Windows) -> None:
-        self.windows, self.offsets = windows, Offsets(windows, self.noise, self._owner.electronics)
+        self.windows, self.offsets = windows, Offsets(windows, self.noise, self._owner)
         self._at, self._slopes = (b"", self._start, self._start, self._start), None
 
     @contextmanager
@@ -166,7 +168,9 @@ class Problem:
         found = predicted(self.offsets.corrected(), self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
         own = slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
         self.derivatives, bent = self.offsets.unexplained(own)
-        return np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
+        found = np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
+        self.last = theta.copy(), found
+        return found
 
     def _linearize(self, rig: Parameters) -> Slopes:
         self._slopes = slopes_at(self.windows, self.noise, rig, self._start)
@@ -189,6 +193,10 @@ class Fit:
     noise: Noise
     cost: float
     ended: bool = True
+
+    def is_good(self, noise: Noise) -> bool:
+        """Whether the residuals are not more than a ``noise`` leaves."""
+        return self.noise.pressure < GOOD * noise.pressure and self.noise.position < GOOD * noise.position
 
     @property
     def covariance(self) -> Array:
@@ -215,6 +223,9 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
                     ftol=TOLERANCE,
                     xtol=TOLERANCE,
                 )
+            except UnsettledError:
+                found = _so_far(problem)
+                break
             except ValueError as error:  # derivatives that are no numbers, in SciPy's words
                 raise ValueError(problem.disagreement()) from error
             place = np.clip(found.x, low + 1e-6, high - 1e-6)
@@ -225,17 +236,38 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
     return Fit(problem.free, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost), found.status > 0)
 
 
+def _so_far(problem: Problem) -> OptimizeResult:
+    """Where a search has come to whose budget is over; ``UnsettledError`` where it does not fit there."""
+    if problem.last is None:
+        raise UnsettledError
+    theta, _ = problem.last
+    _check_fits(problem, theta)
+    jacobian, residuals = problem.jacobian(theta), problem.residuals(theta)
+    return OptimizeResult(x=theta, jac=jacobian, cost=0.5 * float(residuals @ residuals), status=0)
+
+
+def _check_fits(problem: Problem, theta: Array) -> None:
+    """End the budget of a search that has come to ``theta``; ``UnsettledError`` where it does not fit there."""
+    problem.windows.budget.over = True
+    residual, windows = problem.settled(theta)[1], problem.windows
+    counted = np.sum(windows.pressure_weights**2) + 2.0 * np.sum(windows.position_weights**2)
+    if not float(np.sum(residual**2) / counted) < POOR**2:
+        raise UnsettledError
+
+
 def fit(
     trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
 ) -> Fit:
     """The parameters of a trial's rig; ``owner`` is the rig as its owner describes it, ``seed`` draws where to begin."""
-    some = _spread_out(cut(trial, owner, SHORT))
+    some = spread_out(cut(trial, owner, SHORT))
     problem = Problem(some, guessed_noise(trial), owner, free, tick)
     with problem.explained():
-        drawn = _best_drawn(problem, np.random.default_rng(seed))
+        drawn = best_drawn(problem, np.random.default_rng(seed))
     tried = []
     for theta in (problem.centre, drawn):
         tried.append(search(Problem(some, problem.noise, owner, free, tick), theta, MOST[0]))
+        if tried[-1].is_good(problem.noise):
+            break
     return refine(trial, min(tried, key=lambda one: one.cost), owner, free, tick)
 
 
@@ -243,16 +275,22 @@ def refine(trial: Trial, first: Fit, owner: Parameters, free: tuple[FreeParamete
     """The second search, with all of a trial, for ``free``, repeated while it moves noise or latency (``MOVED``)
     or leaves windows that fit worse than others.
 
-    What is not among ``free`` has the owner's value.
+    What is not among ``free`` has the owner's value. Where the budget is over, the fit is the ``first`` one.
     """
     found = first
     for _ in range(MOST_ROUNDS):
+        if found.problem.windows.budget.over:
+            break
         before = found
         problem = Problem(cut(trial, found.rig, budget=found.problem.windows.budget), found.noise, owner, free, tick)
         theta = coordinates(found.rig, free)
-        with problem.explained():
-            problem.begin_anew(found.rig, found.problem.offsets.sizes)
-            problem.reweigh(theta)
+        with found.problem.explained():
+            try:
+                problem.begin_anew(found.rig, found.problem.offsets.sizes)
+                problem.reweigh(theta)
+            except UnsettledError:
+                _check_fits(found.problem, found.theta)
+                break
         found = search(problem, theta, MOST[1])
         if _is_close(before, found, trial.period) and not outliers(problem.settled(found.theta)[1]).any():
             break
@@ -261,25 +299,6 @@ def refine(trial: Trial, first: Fit, owner: Parameters, free: tuple[FreeParamete
 
 def _is_close(before: Fit, found: Fit, period: float) -> bool:
     """Whether noise and latency are those with which a search was made."""
-    late = abs(found.rig.electronics.position_latency - before.rig.electronics.position_latency)
+    late = abs(found.problem.windows.latency_of(found.rig) - found.problem.windows.latency_of(before.rig))
     pairs = ((found.noise.pressure, before.noise.pressure), (found.noise.position, before.noise.position))
     return late < 0.5 * period and all(abs(one / other - 1.0) < MOVED for one, other in pairs)
-
-
-def _spread_out(windows: Windows) -> Windows:
-    count = len(windows.starts)
-    return windows.some(np.unique(np.linspace(0, count - 1, min(SOME, count)).round().astype(np.intp)))
-
-
-def _best_drawn(problem: Problem, rng: np.random.Generator) -> Array:
-    """The best of ``DRAWN`` coordinates (Q,), all side by side as lanes, where start states give way as they do under the
-    owner's rig."""
-    windows, count = problem.windows, len(problem.centre)
-    thetas = np.clip(problem.centre + problem.spread * rng.normal(size=(DRAWN, count)), *problem.limits)
-    free = np.zeros((len(windows.starts), len(windows.free)))
-    slopes = slopes_at(windows, problem.noise, problem.rig_at(problem.centre), free)
-    rigs = [problem.rig_at(theta) for theta in thetas]
-    found = predicted(windows, problem.noise, rigs, np.repeat(free[None], DRAWN, axis=0))
-    # The median over windows: one in which a wrong latency hides the rest does not decide.
-    costs = np.median(np.sum(slopes.unexplained(found.transpose(1, 2, 0)) ** 2, axis=1), axis=0)
-    return np.asarray(thetas[int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))])

@@ -30,7 +30,7 @@ LAWS = {"elasto_plastic": "a bristle that is a spring up to a break-away", "gms"
 LIKELY = 0.3
 """Of the way from the law of the fit to another one, from which that other one is named; assumed."""
 
-SAGS = 3e3
+SAGS = 2e3
 """Pa by which the supply varies from window to window where that is named; assumed."""
 
 

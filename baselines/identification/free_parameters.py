@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from baselines.identification.trial import ENCODERS, TRACKER
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.consistency import least_dead_volume, settling_volume
 from birthsim_env.physics.rig.declaration import Prior
@@ -20,7 +21,7 @@ class FreeParameter(NamedTuple):
     prior: Prior
 
 
-LATENCY = "electronics.position_latency"
+LATENCY = TRACKER
 
 ORDER = ("cylinder1", "cylinder2", "friction", "mechanics", "valves", "chambers")
 """Sections in the order in which estimates are shown; others come behind."""
@@ -35,7 +36,7 @@ def _declared(more: bool) -> tuple[FreeParameter, ...]:
     return tuple(
         FreeParameter(name, one.identified)
         for name, one in sorted(DECLARED.items(), key=lambda item: _place(item[0].partition(".")[0]))
-        if one.identified and bool(one.identified.needs) == more
+        if one.identified and bool(one.identified.needs) == more and name != ENCODERS
     )
 
 
@@ -46,10 +47,13 @@ FURTHER_PARAMETERS = _declared(more=True)
 """What is identified where the owner's rig has it, or the log shows that it is there (``Prior.needs``)."""
 
 
-def free_of(owner: Parameters) -> tuple[FreeParameter, ...]:
-    """What is identified of a rig as its owner describes it."""
-    asked = {one.name for one in FURTHER_PARAMETERS if not _is_default(owner, _needed(one))}
-    return _in_order(one for one in (*FREE_PARAMETERS, *FURTHER_PARAMETERS) if not one.prior.needs or one.name in asked)
+def free_of(owner: Parameters, latency: str = TRACKER) -> tuple[FreeParameter, ...]:
+    """What is identified of a rig as its owner describes it, from a log whose positions have a ``latency``."""
+    asked = (one for one in FURTHER_PARAMETERS if not _is_default(owner, _needed(one)))
+    late = DECLARED[latency].identified
+    assert late, "latencies are declared to be identified"
+    usual = (one for one in FREE_PARAMETERS if one.name != TRACKER)
+    return _in_order((*usual, *asked, FreeParameter(latency, late)))
 
 
 def shown_by(owner: Parameters) -> tuple[FreeParameter, ...]:

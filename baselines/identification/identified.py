@@ -1,17 +1,17 @@
 """The whole identification of a trial: fit, certainty, a rig to write, and its description in words."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
 import numpy as np
 import tomli_w
 
-from baselines.identification.certainty import NORMAL, Certainty, certainty_of
+from baselines.identification.certainty import DETERMINED, NORMAL, Certainty, certainty_of
 from baselines.identification.estimate import Fit, Tick, fit, refine
 from baselines.identification.force_offset import ForceOffset, force_offset
 from baselines.identification.forms import Suspect, shown, suspects
-from baselines.identification.free_parameters import LATENCY, FreeParameter, free_of, shown_by, with_more
+from baselines.identification.free_parameters import FreeParameter, free_of, shown_by, with_more
 from baselines.identification.log_columns import CHAMBERS
 from baselines.identification.noise import LEAST, guessed_noise, noise_of
 from baselines.identification.starts import Noise
@@ -71,6 +71,9 @@ class Identified:
         Residuals of each chamber's pressures over the noise that third differences show.
     suspects : tuple of Suspect
         Forms that the log shows and the model lacks, the likeliest first.
+    zeros, known_zeros : tuple of array (2,), array (2,)
+        What the zeros of encoders are off and the standard deviations, and those that were known before, m; empty where a
+        tracker sees the end effector.
 
     Examples
     --------
@@ -91,6 +94,8 @@ class Identified:
     pull: ForceOffset
     left_over: Array
     suspects: tuple[Suspect, ...] = ()
+    zeros: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    known_zeros: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def misfit(self) -> tuple[float, float]:
@@ -108,7 +113,7 @@ class Identified:
                 "the model leaves more than noise: hands, an offset of the force sensor, leaks, play or a curve of the valves "
                 "that it does not know; see the residuals"
             )
-        lines += [*self._causes(), *self._unlike_valves(), *(one.words for one in self.suspects)]
+        lines += [*self._encoders(), *self._causes(), *self._unlike_valves(), *(one.words for one in self.suspects)]
         if not self.fit.ended:
             lines.append("the search took all the evaluations that it may make, and may end before the best parameters")
         for row in self.rows:
@@ -122,6 +127,15 @@ class Identified:
         for direction in self.certainty.weakest:
             named = ", ".join(f"{part:+.2f} {name}" for name, part in direction.parts)
             lines.append(f"least known: {named}; {direction.deviation:.2g} of what was unknown before")
+        return lines
+
+    def _encoders(self) -> list[str]:
+        """What the zeros of encoders are off, a line each."""
+        lines = []
+        for k, (off, deviation, before) in enumerate(zip(*self.zeros, self.known_zeros, strict=True)):
+            reach = f"{1e3 * off:.3g} +- {1e3 * NORMAL * deviation:.2g} mm"
+            told = "" if deviation < DETERMINED * before else f": no more than what was known, +- {2e3 * before:.2g} mm"
+            lines.append(f"the encoder of cylinder {k + 1} counts {reach} too much{told}")
         return lines
 
     def _causes(self) -> list[str]:
@@ -196,36 +210,41 @@ def identify(
     given = [name for name in REMEMBER if value_of(owner, name)]
     if given:
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
-    asked = free_of(owner) if free is None else free
+    asked = free_of(owner, trial.latency) if free is None else free
     whole = fit(trial, owner, seed, asked, tick)
     more = () if free is not None else shown_by(owner)
     for _ in range(MOST_FORMS):
         with whole.problem.explained():
             values = shown(whole, tuple(one for one in more if one not in whole.free))
-        if not values:
+        if not values or whole.problem.windows.budget.over:
             break
         every = with_more(whole.free, (one for one in more if one.name in values))
         whole = refine(trial, replace(whole, rig=whole.rig.replace(values)), owner, every, tick)
     free = whole.free
     with whole.problem.explained():
         certainty, pull, others = certainty_of(whole), force_offset(whole), suspects(whole)
+    zeros = whole.problem.offsets.encoders(whole.jacobian[: -len(free)], whole.covariance)
+    before = np.empty(0) if trial.counted is None else trial.counted
     found = tuple(one for one, known in zip(free, certainty.determined, strict=True) if known)
-    last = whole if len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
+    over = whole.problem.windows.budget.over
+    last = whole if over or len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
     rig = last.rig if found else owner
     rows = []
     for one, theta, deviation, known in zip(free, whole.theta, certainty.deviation, certainty.determined, strict=True):
         value = value_of(rig, one.name)
         middle, reach = (one.prior.coordinate(value) if known else float(theta)), NORMAL * float(deviation)
-        if one.name == LATENCY and known:
+        if one.name == trial.latency and known:
             value, middle, reach = _latency(one, trial.period, middle, float(deviation))
         low, high = one.prior.value(middle - reach), one.prior.value(middle + reach)
         low = max(low, DECLARED[one.name].least)
         rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(known)))
     changes = {row.name: row.value for row in rows if row.determined}
-    noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
+    seen = "position_noise" if trial.counted is None else "encoder_noise"
+    noise = {"electronics.pressure_noise": last.noise.pressure, f"electronics.{seen}": last.noise.position}
     rig, quick = owner.replace({**changes, **noise}), guessed_noise(trial)
+    left = left_over(last, trial)
     return Identified(
-        tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left_over(last, trial), tuple(others)
+        tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left, tuple(others), zeros, before
     )
 
 

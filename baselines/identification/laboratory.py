@@ -76,4 +76,5 @@ def _run(
 
     loop.close([follow], [add], [*([carry(loop)] if carry else loop.pipeline.group("plant")), look])
     loop.run(count)
-    return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)))
+    counted = np.full(2, rig.electronics.encoder_offset) if sensors.startswith("encoders") else None
+    return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)), counted=counted)

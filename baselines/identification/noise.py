@@ -20,7 +20,9 @@ SOME = 48
 
 def guessed_noise(trial: Trial) -> Noise:
     """From third differences, which leave little of the motion."""
-    pressure, position = (noise_of(values) for values in (trial.pressures, trial.positions[:, fresh_rows(trial.positions)]))
+    # By axis: that of encoders is several times larger along one axis than along the other.
+    seen = trial.positions[:, fresh_rows(trial.positions)]
+    pressure, position = noise_of(trial.pressures), float(np.sqrt(np.mean([noise_of(axis[None]) ** 2 for axis in seen])))
     return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
 
 

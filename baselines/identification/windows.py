@@ -19,7 +19,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.dynamics import coulomb_levels, steps_in
 from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, value_of
 from birthsim_env.physics.spools import are_perfect
 
 LENGTH = 0.25
@@ -90,7 +90,7 @@ class Windows:
 
     def latency_of(self, rig: Parameters) -> float:
         """s by which positions of a rig arrive late."""
-        return rig.electronics.position_latency
+        return late(self.trial, rig)
 
     def some(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Windows:
         """The windows with the numbers ``chosen``, or where ``chosen`` (W,) is True."""
@@ -111,6 +111,11 @@ class Windows:
         )
 
 
+def late(trial: Trial, rig: Parameters) -> float:
+    """s by which the positions of a trial arrive late."""
+    return float(value_of(rig, trial.latency))
+
+
 def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | None = None) -> Windows:
     """Windows of a trial, without overlap, for a rig as far as it is known; ``ValueError`` where the log has too many gaps.
 
@@ -119,7 +124,7 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
     period, rows = trial.period, len(trial.times)
     k, margin = max(8, round(length / period)), round(0.1 / period)
     fresh = fresh_rows(trial.positions)
-    lag = round(rig.electronics.position_latency / period)
+    lag = round(late(trial, rig) / period)
     starts = _measured(trial, np.arange(margin, rows - margin - k, k), k, lag, fresh)
     own = [fresh[(fresh >= start + lag) & (fresh < start + k + lag)] for start in starts]
     most = max(map(len, own))
@@ -198,7 +203,7 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     walls, the same pressure at both ends of a tube."""
     period, column = trial.period, parameter_column(rig)
     state = np.zeros((at.STATES, len(starts)))
-    taken = trial.times[fresh] - rig.electronics.position_latency
+    taken = trial.times[fresh] - late(trial, rig)
     motion = np.empty((4, len(starts)))
     for w, now in enumerate(trial.times[starts]):
         near = np.abs(taken - now) <= max(SMOOTHED, 4 * period)
