@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from baselines.identification.trial import Trial
 
-TIMES, AT_LEAST = 9_000.0, 45_000.0
+TIMES, AT_LEAST = 7_000.0, 35_000.0
 """How often the duration of a log is predicted at most, and s that are predicted at most of a short one; good logs take some
 2,000 times their duration. A second takes 1 ms of a processor."""
 

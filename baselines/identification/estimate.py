@@ -16,7 +16,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from baselines.identification.beginnings import SHORT, best_drawn, spread_out
 from baselines.identification.budget import UnsettledError
 from baselines.identification.free_parameters import FREE_PARAMETERS, FreeParameter, coordinates, limits, rig_at
-from baselines.identification.noise import guessed_noise, noise_from
+from baselines.identification.noise import guessed_noise, is_fitting, noise_from
 from baselines.identification.offsets import Offsets
 from baselines.identification.robust import reweighted
 from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
@@ -46,9 +46,6 @@ STILL, MOST_STEPS = 0.1, 6
 
 MOST_WEIGHTS = 3
 """Times that a search is repeated with new weights (``robust``) at most."""
-
-POOR = 2.0
-"""Residuals over the noise with which a search whose budget ends has found nothing; assumed."""
 
 NAMED = 3
 """Windows that are named where a search fails."""
@@ -249,9 +246,7 @@ def _so_far(problem: Problem) -> OptimizeResult:
 def _check_fits(problem: Problem, theta: Array) -> None:
     """End the budget of a search that has come to ``theta``; ``UnsettledError`` where it does not fit there."""
     problem.windows.budget.over = True
-    residual, windows = problem.settled(theta)[1], problem.windows
-    counted = np.sum(windows.pressure_weights**2) + 2.0 * np.sum(windows.position_weights**2)
-    if not float(np.sum(residual**2) / counted) < POOR**2:
+    if not is_fitting(problem.windows, problem.settled(theta)[1]):
         raise UnsettledError
 
 

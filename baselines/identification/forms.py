@@ -2,8 +2,7 @@
 
 Two kinds are looked for. Some have a number that the model knows but takes for none (``free_parameters.shown_by``): friction
 that depends on the way of motion, hysteresis of the valves, exhaust edges unlike those to the supply. Where the log shows them
-they are identified as well. Others are another model: a law of friction with memory, a supply that sags. They are named, and
-their owner's file may have them.
+they are identified as well. A supply that sags is another model: it is named, and the owner's file may have its line.
 """
 
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from baselines.identification.estimate import Fit
 from baselines.identification.free_parameters import FreeParameter, coordinates, rig_at
 from baselines.identification.one_step import one_step
 from baselines.identification.starts import predicted
-from baselines.identification.windows import Windows, with_options
+from baselines.identification.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 
@@ -24,13 +23,7 @@ PART = 0.25
 SURE, LEAST = 4.0, 0.1
 """Standard deviations, and part of the owner's spread, from which a form is there; assumed."""
 
-LAWS = {"elasto_plastic": "a bristle that is a spring up to a break-away", "gms": "bristles that remember reversals"}
-"""Laws of friction that a log of another one may show."""
-
-LIKELY = 0.3
-"""Of the way from the law of the fit to another one, from which that other one is named; assumed."""
-
-SAGS = 2e3
+SAGS = 3e3
 """Pa by which the supply varies from window to window where that is named; assumed."""
 
 
@@ -59,11 +52,6 @@ def shown(fit: Fit, forms: tuple[FreeParameter, ...]) -> dict[str, float]:
     return values
 
 
-def suspects(fit: Fit) -> list[Suspect]:
-    """Other forms that the log shows, the likeliest first."""
-    return sorted([*_laws(fit), *_supply(fit)], key=lambda one: -one.gain)
-
-
 def _columns(fit: Fit, windows: Windows, rigs: list[Parameters]) -> Array:
     """How residuals (W, R + F, C) change from the fit's rig to ``rigs``."""
     free, residual = fit.problem.settled(fit.theta)
@@ -71,26 +59,11 @@ def _columns(fit: Fit, windows: Windows, rigs: list[Parameters]) -> Array:
     return np.asarray((found - residual).transpose(1, 2, 0))
 
 
-def _laws(fit: Fit) -> list[Suspect]:
-    """Other laws of friction: how far from the fit's law to them the log is."""
-    windows, own, found = fit.problem.offsets.corrected(), fit.rig.friction.law, []
-    if own == "coulomb":
-        return []
-    for law, about in LAWS.items():
-        if law == own:
-            continue
-        rig = fit.rig.replace({"friction.law": law})
-        step = one_step(fit, _columns(fit, with_options(windows, rig), [rig]))
-        value, deviation = float(step.value[0]), float(step.deviation[0])
-        if value > max(SURE * deviation, LIKELY):
-            way = f"{100 * value:.0f} +- {200 * deviation:.0f} % of the way from {own} to {law}, {about}"
-            words = f'friction before sliding is another one: {way}; friction.law = "{law}" in --parameters, and identify again'
-            found.append(Suspect(words, step.gain))
-    return found
+def suspects(fit: Fit) -> list[Suspect]:
+    """Other forms that the log shows: a supply whose pressure is another one in every window.
 
-
-def _supply(fit: Fit) -> list[Suspect]:
-    """A supply whose pressure is another one in every window: the scatter of the pressures that fit each window best."""
+    It is the scatter of the pressures that fit each window best.
+    """
     problem = fit.problem
     rig = fit.rig.replace({"air.supply_pressure": fit.rig.air.supply_pressure + SAGS})
     slopes = problem.slopes.unexplained(_columns(fit, problem.offsets.corrected(), [rig]) / SAGS)[..., 0]

@@ -110,8 +110,8 @@ class Identified:
         lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
         if max(pressure, position) > MISFIT:
             lines.append(
-                "the model leaves more than noise: hands, an offset of the force sensor, leaks, play or a curve of the valves "
-                "that it does not know; see the residuals"
+                f"the model leaves more than noise in {self._worst()}: {self._forms()}, hands, an offset of the force sensor; "
+                "see the residuals"
             )
         lines += [*self._encoders(), *self._causes(), *self._unlike_valves(), *(one.words for one in self.suspects)]
         if not self.fit.ended:
@@ -128,6 +128,19 @@ class Identified:
             named = ", ".join(f"{part:+.2f} {name}" for name, part in direction.parts)
             lines.append(f"least known: {named}; {direction.deviation:.2g} of what was unknown before")
         return lines
+
+    def _worst(self) -> str:
+        """The signals of which the model leaves more than noise."""
+        pressures = [f"pressures_{name}" for name, left in zip(CHAMBERS, self.left_over, strict=True) if left > MISFIT]
+        return ", ".join([*pressures, *(["the positions"] if self.misfit[1] > MISFIT else [])]) or "the pressures"
+
+    def _forms(self) -> str:
+        """What may be of another form, by the signal that fits worse."""
+        if self.misfit[1] > self.misfit[0]:
+            return (
+                'friction of another law, such as friction.law = "gms", or along the stroke, a bore or a lever measured wrong'
+            )
+        return "leaks, spools of second order, commands that are late, a curve of the valves or a tube that it does not know"
 
     def _encoders(self) -> list[str]:
         """What the zeros of encoders are off, a line each."""
@@ -222,11 +235,16 @@ def identify(
         whole = refine(trial, replace(whole, rig=whole.rig.replace(values)), owner, every, tick)
     free = whole.free
     with whole.problem.explained():
-        certainty, pull, others = certainty_of(whole), force_offset(whole), suspects(whole)
+        certainty, pull, others = (
+            certainty_of(whole),
+            force_offset(whole),
+            suspects(whole),
+        )
     zeros = whole.problem.offsets.encoders(whole.jacobian[: -len(free)], whole.covariance)
     before = np.empty(0) if trial.counted is None else trial.counted
     found = tuple(one for one, known in zip(free, certainty.determined, strict=True) if known)
     over = whole.problem.windows.budget.over
+    whole = replace(whole, ended=whole.ended and not over)
     last = whole if over or len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
     rig = last.rig if found else owner
     rows = []

@@ -17,6 +17,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 LANES = 4096
 """Lanes at once; more only take memory."""
 
+SLOWER = 3.0
+"""Times that a second of a rig with options counts; moving it takes eight times as long, and the rest as long as always."""
+
 
 def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tuple[Array, Array, Array]:
     """Pressures (V, W, K, 4), Pa, positions (V, W, F, 2), m, and states at the end (S, V, W), for V ``rigs``.
@@ -25,8 +28,9 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
     window have made of them. A position that arrives at a time was taken a latency earlier.
     """
     count, trial = len(windows.starts), windows.trial
-    windows.budget.spend(count * len(rigs) * windows.length * trial.period)
     columns = np.array([parameter_column(rig) for rig in rigs]).T
+    plain = options.are_off(columns)
+    windows.budget.spend((1.0 if plain else SLOWER) * count * len(rigs) * windows.length * trial.period)
     late = np.array([windows.latency_of(rig) for rig in rigs]) / trial.period
     states = states.copy()
     openings, forces, part_of = _driving(windows, columns, states)
@@ -34,7 +38,6 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
     positions = np.empty((len(rigs), count, *windows.positions.shape[1:]))
     at_once = max(1, LANES // count)
     clock = Clock(Clock.numbers(period=trial.period, steps=steps_in(trial.period)))
-    plain = options.are_off(columns)
     for first in range(0, len(rigs), at_once):
         part = slice(first, first + at_once)
         moved = states[:, part].reshape(len(states), -1)

@@ -6,7 +6,7 @@ of its own, do not; they are lanes of the plant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,13 +154,6 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
 def has_options(rig: Parameters) -> bool:
     """Whether the state of a rig has further rows."""
     return bool(rig.chambers.tube_length or rig.air.supply_conductance or rig.friction.law == "gms")
-
-
-def with_options(windows: Windows, rig: Parameters) -> Windows:
-    """The windows with the further rows of the state that a rig with options has."""
-    if not has_options(rig) or len(windows.state) > at.STATES:
-        return windows
-    return replace(windows, state=np.concatenate([windows.state, _further(windows.state, rig)]))
 
 
 def _further(state: Array, rig: Parameters) -> Array:
