@@ -13,22 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
+from baselines.identification.beginnings import SHORT, best_drawn, spread_out
 from baselines.identification.budget import UnsettledError
 from baselines.identification.free_parameters import FREE_PARAMETERS, FreeParameter, coordinates, limits, rig_at
-from baselines.identification.noise import guessed_noise, noise_from
+from baselines.identification.noise import guessed_noise, is_fitting, noise_from
 from baselines.identification.offsets import Offsets
 from baselines.identification.robust import reweighted
 from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
-from baselines.identification.windows import FREE, Windows, cut
+from baselines.identification.windows import Windows, cut
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-
-SHORT, SOME = 0.1, 24
-"""s and number of the windows of the first search, assumed."""
-
-DRAWN = 48
-"""Rigs that are drawn to begin the first search at, assumed."""
 
 MOST = (25, 30)
 """Evaluations of the first and of the second search at most."""
@@ -36,6 +31,9 @@ MOST = (25, 30)
 TOLERANCE = 1e-7
 """A search ends where a step lowers the cost, or moves the coordinates, by less than this fraction. The cost is some 3e4, of
 which 0.5 is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way."""
+
+GOOD = 1.1
+"""Residuals over the noise of neighbouring samples up to which a search has found the rig, and does not begin elsewhere too."""
 
 DIFFERENCE = 1e-5
 """Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
@@ -66,12 +64,13 @@ class Problem:
         self.noise, self.free, self._owner, self._tick = noise, free, owner, tick
         self.centre, self.limits = coordinates(owner, free), limits(owner, free)
         self.spread: Array = np.array([one.prior.spread for one in free])
-        self._start: Array = np.zeros((len(windows.starts), len(FREE)))
+        self._start: Array = np.zeros((len(windows.starts), len(windows.free)))
         self._at: tuple[bytes, Array, Array, Array]
         self._slopes: Slopes | None
         self._take(windows)
-        self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(FREE)
+        self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(windows.free)
         self.derivatives: Array = np.empty(0)
+        self.last: tuple[Array, Array] | None = None
 
     @property
     def slopes(self) -> Slopes:
@@ -89,7 +88,7 @@ class Problem:
         self._start = begun_anew(self.offsets.corrected(), self.noise, rig, self._start)
 
     def settled(self, theta: Array) -> tuple[Array, Array]:
-        """Start states (W, 14) and residuals (W, R + 14) at coordinates (Q,); NaN where the rig predicts no numbers."""
+        """Start states (W, F) and residuals (W, R + F) at coordinates (Q,); NaN where the rig predicts no numbers."""
         if self._at[0] != theta.tobytes():
             self._tick()
             before = self.offsets.sizes
@@ -127,7 +126,7 @@ class Problem:
         return True
 
     def _take(self, windows: Windows) -> None:
-        self.windows, self.offsets = windows, Offsets(windows, self.noise, self._owner.electronics)
+        self.windows, self.offsets = windows, Offsets(windows, self.noise, self._owner)
         self._at, self._slopes = (b"", self._start, self._start, self._start), None
 
     @contextmanager
@@ -153,11 +152,11 @@ class Problem:
         )
 
     def residuals(self, theta: Array) -> Array:
-        """All residuals, (W (R + 14) + E + Q,)."""
+        """All residuals, (W (R + F) + E + Q,)."""
         return np.concatenate([self.settled(theta)[1].ravel(), self._at[3], (theta - self.centre) / self.spread])
 
     def jacobian(self, theta: Array) -> Array:
-        """Their derivatives, (W (R + 14) + E + Q, Q), less what start states and offsets make up for: one lane a parameter and
+        """Their derivatives, (W (R + F) + E + Q, Q), less what start states and offsets make up for: one lane a parameter and
         window."""
         self._start, residual = self.settled(theta)
         slopes = self._linearize(self.rig_at(theta))
@@ -166,7 +165,9 @@ class Problem:
         found = predicted(self.offsets.corrected(), self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
         own = slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
         self.derivatives, bent = self.offsets.unexplained(own)
-        return np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
+        found = np.concatenate([self.derivatives.reshape(-1, len(theta)), bent, np.diag(1.0 / self.spread)])
+        self.last = theta.copy(), found
+        return found
 
     def _linearize(self, rig: Parameters) -> Slopes:
         self._slopes = slopes_at(self.windows, self.noise, rig, self._start)
@@ -189,6 +190,10 @@ class Fit:
     noise: Noise
     cost: float
     ended: bool = True
+
+    def is_good(self, noise: Noise) -> bool:
+        """Whether the residuals are not more than a ``noise`` leaves."""
+        return self.noise.pressure < GOOD * noise.pressure and self.noise.position < GOOD * noise.position
 
     @property
     def covariance(self) -> Array:
@@ -215,6 +220,9 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
                     ftol=TOLERANCE,
                     xtol=TOLERANCE,
                 )
+            except UnsettledError:
+                found = _so_far(problem)
+                break
             except ValueError as error:  # derivatives that are no numbers, in SciPy's words
                 raise ValueError(problem.disagreement()) from error
             place = np.clip(found.x, low + 1e-6, high - 1e-6)
@@ -225,17 +233,36 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
     return Fit(problem.free, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost), found.status > 0)
 
 
+def _so_far(problem: Problem) -> OptimizeResult:
+    """Where a search has come to whose budget is over; ``UnsettledError`` where it does not fit there."""
+    if problem.last is None:
+        raise UnsettledError
+    theta, _ = problem.last
+    _check_fits(problem, theta)
+    jacobian, residuals = problem.jacobian(theta), problem.residuals(theta)
+    return OptimizeResult(x=theta, jac=jacobian, cost=0.5 * float(residuals @ residuals), status=0)
+
+
+def _check_fits(problem: Problem, theta: Array) -> None:
+    """End the budget of a search that has come to ``theta``; ``UnsettledError`` where it does not fit there."""
+    problem.windows.budget.over = True
+    if not is_fitting(problem.windows, problem.settled(theta)[1]):
+        raise UnsettledError
+
+
 def fit(
     trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
 ) -> Fit:
     """The parameters of a trial's rig; ``owner`` is the rig as its owner describes it, ``seed`` draws where to begin."""
-    some = _spread_out(cut(trial, owner, SHORT))
+    some = spread_out(cut(trial, owner, SHORT))
     problem = Problem(some, guessed_noise(trial), owner, free, tick)
     with problem.explained():
-        drawn = _best_drawn(problem, np.random.default_rng(seed))
+        drawn = best_drawn(problem, np.random.default_rng(seed))
     tried = []
     for theta in (problem.centre, drawn):
         tried.append(search(Problem(some, problem.noise, owner, free, tick), theta, MOST[0]))
+        if tried[-1].is_good(problem.noise):
+            break
     return refine(trial, min(tried, key=lambda one: one.cost), owner, free, tick)
 
 
@@ -243,16 +270,22 @@ def refine(trial: Trial, first: Fit, owner: Parameters, free: tuple[FreeParamete
     """The second search, with all of a trial, for ``free``, repeated while it moves noise or latency (``MOVED``)
     or leaves windows that fit worse than others.
 
-    What is not among ``free`` has the owner's value.
+    What is not among ``free`` has the owner's value. Where the budget is over, the fit is the ``first`` one.
     """
     found = first
     for _ in range(MOST_ROUNDS):
+        if found.problem.windows.budget.over:
+            break
         before = found
         problem = Problem(cut(trial, found.rig, budget=found.problem.windows.budget), found.noise, owner, free, tick)
         theta = coordinates(found.rig, free)
-        with problem.explained():
-            problem.begin_anew(found.rig, found.problem.offsets.sizes)
-            problem.reweigh(theta)
+        with found.problem.explained():
+            try:
+                problem.begin_anew(found.rig, found.problem.offsets.sizes)
+                problem.reweigh(theta)
+            except UnsettledError:
+                _check_fits(found.problem, found.theta)
+                break
         found = search(problem, theta, MOST[1])
         if _is_close(before, found, trial.period) and not outliers(problem.settled(found.theta)[1]).any():
             break
@@ -261,25 +294,6 @@ def refine(trial: Trial, first: Fit, owner: Parameters, free: tuple[FreeParamete
 
 def _is_close(before: Fit, found: Fit, period: float) -> bool:
     """Whether noise and latency are those with which a search was made."""
-    late = abs(found.rig.electronics.position_latency - before.rig.electronics.position_latency)
+    late = abs(found.problem.windows.latency_of(found.rig) - found.problem.windows.latency_of(before.rig))
     pairs = ((found.noise.pressure, before.noise.pressure), (found.noise.position, before.noise.position))
     return late < 0.5 * period and all(abs(one / other - 1.0) < MOVED for one, other in pairs)
-
-
-def _spread_out(windows: Windows) -> Windows:
-    count = len(windows.starts)
-    return windows.some(np.unique(np.linspace(0, count - 1, min(SOME, count)).round().astype(np.intp)))
-
-
-def _best_drawn(problem: Problem, rng: np.random.Generator) -> Array:
-    """The best of ``DRAWN`` coordinates (Q,), all side by side as lanes, where start states give way as they do under the
-    owner's rig."""
-    windows, count = problem.windows, len(problem.centre)
-    thetas = np.clip(problem.centre + problem.spread * rng.normal(size=(DRAWN, count)), *problem.limits)
-    free = np.zeros((len(windows.starts), len(FREE)))
-    slopes = slopes_at(windows, problem.noise, problem.rig_at(problem.centre), free)
-    rigs = [problem.rig_at(theta) for theta in thetas]
-    found = predicted(windows, problem.noise, rigs, np.repeat(free[None], DRAWN, axis=0))
-    # The median over windows: one in which a wrong latency hides the rest does not decide.
-    costs = np.median(np.sum(slopes.unexplained(found.transpose(1, 2, 0)) ** 2, axis=1), axis=0)
-    return np.asarray(thetas[int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))])

@@ -2,8 +2,10 @@
 
 The target is a multisine of both pistons through most of their strokes: long travel tells the dead volume from the flow, the
 weight and the accelerations tell the mass, reversals and speeds from zero to 0.3 m/s tell the friction. The openings that are
-added to those of the law, steps of random size and length, tell conductance and lag of the valves. The law keeps the pistons
-away from the end stops, so that the experiment is safe where the law is.
+added to those of the law, steps of random size and length, tell conductance and lag of the valves. The pneumatic stiffness that
+is asked of the law goes up and down: with it goes the sum of a cylinder's pressures, which tells the friction that grows with
+them from the one that does not. The law keeps the pistons away from the end stops, so that the experiment is safe where the law
+is.
 """
 
 from dataclasses import dataclass
@@ -14,12 +16,15 @@ import numpy as np
 from birthsim_env.files import write_text
 from birthsim_env.parts.courses import check_points
 from birthsim_env.parts.points import Through
+from birthsim_env.parts.stiffness_schedules import SOFTEST, STIFFEST
 from birthsim_env.parts.times import unit_of
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
-from birthsim_env.tables.columns import columns
+from birthsim_env.tables.columns import LARGEST, columns
+from birthsim_env.tables.reading import read_table
+from birthsim_env.tables.table import Reading
 
 GRID = 0.01
 """s between the rows of a plan."""
@@ -39,9 +44,21 @@ STEP = 0.3
 HELD = (2, 8)
 """Shortest and longest time for which an added opening is held, in rows of the plan."""
 
+SOFT, STIFF = 0.6, 1.4
+"""Least and largest pneumatic stiffness over that of ``PNEUMATIC``; assumed. Beyond, valves saturate."""
+
+PNEUMATIC = (4400.0, 2200.0)
+"""N/m asked of the pneumatic stiffness of cylinders 1 and 2 in the mean."""
+
+CYCLES = (2.0, 3.0)
+"""Times that the stiffness of cylinder 1 and that of cylinder 2 go up and down in a plan."""
+
 ADDED = ("added_P1", "added_N1", "added_P2", "added_N2")
 NAMES = {"time": "s", "x": "m", "y": "m", **dict.fromkeys(ADDED, "1")}
 """Columns of a plan and their units; the last four are openings in [-1, 1] that are added to the law's."""
+
+ASKED = {"stiffness_1": "N/m", "stiffness_2": "N/m"}
+"""Columns that a plan may lack, with pneumatic stiffness setpoints of cylinders 1 and 2 for a law that knows them."""
 
 SHORTEST, DURATION, LONGEST = 4.0, 12.0, 600.0
 """s of a plan: the shortest, one that is proposed, with which the table of docs/identify.md is made, and the longest."""
@@ -49,16 +66,23 @@ SHORTEST, DURATION, LONGEST = 4.0, 12.0, 600.0
 
 @dataclass(frozen=True)
 class Plan:
-    """Rows of an experiment: ``times`` (T,), s, ``target`` (2, T), m, ``added`` (4, T), openings, each held until the next."""
+    """Rows of an experiment: ``times`` (T,), s, ``target`` (2, T), m, ``added`` (4, T), openings, each held until the next, and
+    pneumatic ``stiffness`` (2, T), N/m, straight in between; without, it is ``PNEUMATIC``."""
 
     times: Array
     target: Array
     added: Array
+    stiffness: Array | None = None
+
+    def asked(self) -> Array:
+        """The pneumatic stiffness (2, T) of every row."""
+        held = np.repeat(np.transpose([PNEUMATIC]), len(self.times), axis=1)
+        return held if self.stiffness is None else self.stiffness
 
     def write(self, path: Path) -> None:
-        """Write the plan as CSV with the columns ``NAMES``."""
-        rows = np.vstack([self.times, self.target, self.added]).T
-        lines = [",".join(NAMES), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+        """Write the plan as CSV with the columns ``NAMES`` and ``ASKED``."""
+        rows = np.vstack([self.times, self.target, self.added, self.asked()]).T
+        lines = [",".join((*NAMES, *ASKED)), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
         write_text(path, "\n".join(lines) + "\n")
 
 
@@ -71,7 +95,15 @@ def propose(rig: Parameters, duration: float, seed: int = 0) -> Plan:
     ramp = ramp**3 * (10 - 15 * ramp + 6 * ramp**2)
     piston = np.array([_multisine(times, 0.5 * one.stroke, rng) * ramp for one in (rig.cylinder1, rig.cylinder2)])
     added = np.array([_steps(len(times), rng) for _ in range(4)]) * (ramp >= 1.0)
-    return Plan(times, end_effector(piston, rig), added)
+    return Plan(times, end_effector(piston, rig), added, _stiffness(times))
+
+
+def _stiffness(times: Array) -> Array:
+    """Pneumatic stiffness (2, T), N/m: from the mean up and down, geometrically."""
+    part = (times - times[0]) / (times[-1] - times[0])
+    waves = np.sin(2 * np.pi * np.outer(CYCLES, part))
+    high, low = np.log(STIFF), -np.log(SOFT)
+    return np.asarray(np.transpose([PNEUMATIC]) * np.exp(np.where(waves > 0, high, low) * waves))
 
 
 def _multisine(times: Array, half_stroke: float, rng: np.random.Generator) -> Array:
@@ -89,8 +121,10 @@ def _steps(rows: int, rng: np.random.Generator) -> Array:
 
 def read_plan(path: Path, rig: Parameters) -> Plan:
     """The plan that ``Plan.write`` wrote; ``ValueError`` names what is wrong with the file, also for this rig."""
-    where, found = f"plan = {str(path)!r}", columns("plan", (Path(path), ""), NAMES, tuple(NAMES)).T
-    times, target, added = found[0], found[1:3], found[3:]
+    table = read_table("plan", Path(path), Reading(most=LARGEST))
+    names = (*NAMES, *(ASKED if set(ASKED) <= set(table.columns) else ()))
+    where, found = f"plan = {str(path)!r}", columns("plan", (Path(path), ""), NAMES | ASKED, names).T
+    times, target, added, stiffness = found[0], found[1:3], found[3:7], found[7:]
     if len(times) < 8:
         raise ValueError(f"{where} has {len(times)} rows; allowed: at least 8")
     if not abs(times[0]) <= LONGEST:
@@ -106,4 +140,6 @@ def read_plan(path: Path, rig: Parameters) -> Plan:
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
     check_points(where, through, times[-1] - times[0], rig)
-    return Plan(times, target, added)
+    if len(stiffness) and not (SOFTEST <= stiffness.min() <= stiffness.max() <= STIFFEST):
+        raise ValueError(f"{where}: a stiffness of {stiffness.min():g} N/m; allowed: {SOFTEST:g} to {STIFFEST:g}")
+    return Plan(times, target, added, stiffness if len(stiffness) else None)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from baselines.identification.certainty import score_products
 from baselines.identification.estimate import Fit
+from baselines.identification.one_step import one_step
 from baselines.identification.starts import predicted
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -38,21 +38,14 @@ class ForceOffset:
 
 
 def force_offset(fit: Fit) -> ForceOffset:
-    """One Gauss-Newton step of a fit whose parameters, start states and sensors' errors give way as well."""
+    """One Gauss-Newton step of a fit, in which all else gives way as well (``one_step``)."""
     problem = fit.problem
     free, residual = problem.settled(fit.theta)
-    windows, slopes = problem.offsets.corrected(), problem.slopes
+    windows = problem.offsets.corrected()
     columns = []
     for axis in range(2):
         forces = windows.trial.forces + STEP * np.eye(2)[:, [axis]]
         pushed = replace(windows, trial=replace(windows.trial, forces=forces))
         columns.append((predicted(pushed, problem.noise, [fit.rig], free[None])[0] - residual) / STEP)
-    derivatives, bent = problem.offsets.unexplained(slopes.unexplained(np.stack(columns, axis=2)))
-    tall = np.concatenate([derivatives.reshape(-1, 2), bent, np.zeros((len(fit.theta), 2))])
-    every = np.hstack([fit.jacobian, tall])
-    covariance = np.linalg.inv(every.T @ every)
-    step = -covariance @ (every.T @ problem.residuals(fit.theta))
-    both = np.concatenate([problem.derivatives, derivatives], axis=2)
-    scores = score_products(residual + both @ step, both)
-    variance = np.maximum(np.diag(covariance), np.diag(covariance @ scores @ covariance))
-    return ForceOffset(step[-2:], np.sqrt(variance[-2:]))
+    found = one_step(fit, np.stack(columns, axis=2))
+    return ForceOffset(found.value, found.deviation)

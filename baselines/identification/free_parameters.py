@@ -1,14 +1,17 @@
 """What is identified: parameters of a rig, how they are scaled, and how far from the owner's value they may lie."""
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
+from baselines.identification.trial import ENCODERS, TRACKER
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.consistency import least_dead_volume
+from birthsim_env.physics.rig.consistency import least_dead_volume, settling_volume
 from birthsim_env.physics.rig.declaration import Prior
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
+from birthsim_env.physics.step import STEP
 
 
 class FreeParameter(NamedTuple):
@@ -18,7 +21,7 @@ class FreeParameter(NamedTuple):
     prior: Prior
 
 
-LATENCY = "electronics.position_latency"
+LATENCY = TRACKER
 
 ORDER = ("cylinder1", "cylinder2", "friction", "mechanics", "valves", "chambers")
 """Sections in the order in which estimates are shown; others come behind."""
@@ -28,12 +31,54 @@ def _place(section: str) -> int:
     return (*ORDER, section).index(section)
 
 
-FREE_PARAMETERS = tuple(
-    FreeParameter(name, one.identified)
-    for name, one in sorted(DECLARED.items(), key=lambda item: _place(item[0].partition(".")[0]))
-    if one.identified
-)
-"""What is identified: the parameters that are declared so."""
+def _declared(more: bool) -> tuple[FreeParameter, ...]:
+    """What is identified, of rigs in general, or where the rig has ``more`` than the default one."""
+    return tuple(
+        FreeParameter(name, one.identified)
+        for name, one in sorted(DECLARED.items(), key=lambda item: _place(item[0].partition(".")[0]))
+        if one.identified and bool(one.identified.needs) == more and name != ENCODERS
+    )
+
+
+FREE_PARAMETERS = _declared(more=False)
+"""What is identified of any rig: the parameters that are declared so."""
+
+FURTHER_PARAMETERS = _declared(more=True)
+"""What is identified where the owner's rig has it, or the log shows that it is there (``Prior.needs``)."""
+
+
+def free_of(owner: Parameters, latency: str = TRACKER) -> tuple[FreeParameter, ...]:
+    """What is identified of a rig as its owner describes it, from a log whose positions have a ``latency``."""
+    asked = (one for one in FURTHER_PARAMETERS if not _is_default(owner, _needed(one)))
+    late = DECLARED[latency].identified
+    assert late, "latencies are declared to be identified"
+    usual = (one for one in FREE_PARAMETERS if one.name != TRACKER)
+    return _in_order((*usual, *asked, FreeParameter(latency, late)))
+
+
+def shown_by(owner: Parameters) -> tuple[FreeParameter, ...]:
+    """What a log may show though the owner's rig lacks it."""
+    return tuple(
+        one for one in FURTHER_PARAMETERS if one.prior.scale and _needed(one) == one.name and _is_default(owner, one.name)
+    )
+
+
+def with_more(free: tuple[FreeParameter, ...], more: Iterable[FreeParameter]) -> tuple[FreeParameter, ...]:
+    """``free`` and ``more`` in the order in which estimates are shown."""
+    return _in_order((*free, *more))
+
+
+def _needed(one: FreeParameter) -> str:
+    return f"{one.name.partition('.')[0]}.{one.prior.needs}"
+
+
+def _is_default(rig: Parameters, name: str) -> bool:
+    return bool(value_of(rig, name) == DECLARED[name].default)
+
+
+def _in_order(free: Iterable[FreeParameter]) -> tuple[FreeParameter, ...]:
+    places = list(DECLARED)
+    return tuple(sorted(free, key=lambda one: (_place(one.name.partition(".")[0]), places.index(one.name))))
 
 
 FURTHEST = 3.5
@@ -67,5 +112,26 @@ def coordinates(rig: Parameters, free: tuple[FreeParameter, ...]) -> Array:
 
 
 def rig_at(rig: Parameters, free: tuple[FreeParameter, ...], theta: Array) -> Parameters:
-    """``rig`` with the values at coordinates (Q,)."""
-    return rig.replace({one.name: one.prior.value(float(c)) for one, c in zip(free, theta, strict=True)})
+    """``rig`` with the values at coordinates (Q,), the nearest that a step of the integrator can follow.
+
+    A search comes by large valves on small chambers, and by dampers on light heads: the dead volume and the mass of such a rig
+    are the least possible ones.
+    """
+    changes = {one.name: one.prior.value(float(c)) for one, c in zip(free, theta, strict=True)}
+    try:
+        return rig.replace(changes)
+    except ValueError:
+        return rig.replace(changes | _possible(rig, changes))
+
+
+def _possible(rig: Parameters, changes: dict[str, float]) -> dict[str, float]:
+    """Mass and dead volume that let steps of the integrator follow a rig with ``changes``, no less than there."""
+    volume, mass = "chambers.dead_volume", "mechanics.mass"
+    large = rig.replace(changes | {volume: 1e3, mass: 1e9})
+    tube = large.chambers.whole_dead_volume - large.chambers.dead_volume
+    viscous = max(large.cylinder1.viscous_friction, large.cylinder2.viscous_friction)
+    least = {
+        volume: settling_volume(large) / STEP.fastest_air - tube,
+        mass: (viscous + large.friction.bristle_damping) / STEP.fastest_rate,
+    }
+    return {name: max(changes.get(name, value_of(rig, name)), (1.0 + 1e-9) * at_least) for name, at_least in least.items()}

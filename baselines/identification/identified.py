@@ -1,16 +1,17 @@
 """The whole identification of a trial: fit, certainty, a rig to write, and its description in words."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
 import numpy as np
 import tomli_w
 
-from baselines.identification.certainty import NORMAL, Certainty, certainty_of
+from baselines.identification.certainty import DETERMINED, NORMAL, Certainty, certainty_of
 from baselines.identification.estimate import Fit, Tick, fit, refine
 from baselines.identification.force_offset import ForceOffset, force_offset
-from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY, FreeParameter
+from baselines.identification.forms import Suspect, shown, suspects
+from baselines.identification.free_parameters import FreeParameter, free_of, shown_by, with_more
 from baselines.identification.log_columns import CHAMBERS
 from baselines.identification.noise import LEAST, guessed_noise, noise_of
 from baselines.identification.starts import Noise
@@ -68,6 +69,11 @@ class Identified:
         A constant force that the log lacks.
     left_over : array (4,)
         Residuals of each chamber's pressures over the noise that third differences show.
+    suspects : tuple of Suspect
+        Forms that the log shows and the model lacks, the likeliest first.
+    zeros, known_zeros : tuple of array (2,), array (2,)
+        What the zeros of encoders are off and the standard deviations, and those that were known before, m; empty where a
+        tracker sees the end effector.
 
     Examples
     --------
@@ -87,6 +93,9 @@ class Identified:
     notes: tuple[str, ...]
     pull: ForceOffset
     left_over: Array
+    suspects: tuple[Suspect, ...] = ()
+    zeros: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    known_zeros: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def misfit(self) -> tuple[float, float]:
@@ -101,10 +110,10 @@ class Identified:
         lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
         if max(pressure, position) > MISFIT:
             lines.append(
-                "the model leaves more than noise: hands, an offset of the force sensor, leaks, play or a curve of the valves "
-                "that it does not know; see the residuals"
+                f"the model leaves more than noise in {self._worst()}: {self._forms()}, hands, an offset of the force sensor; "
+                "see the residuals"
             )
-        lines += [*self._causes(), *self._unlike_valves()]
+        lines += [*self._encoders(), *self._causes(), *self._unlike_valves(), *(one.words for one in self.suspects)]
         if not self.fit.ended:
             lines.append("the search took all the evaluations that it may make, and may end before the best parameters")
         for row in self.rows:
@@ -118,6 +127,28 @@ class Identified:
         for direction in self.certainty.weakest:
             named = ", ".join(f"{part:+.2f} {name}" for name, part in direction.parts)
             lines.append(f"least known: {named}; {direction.deviation:.2g} of what was unknown before")
+        return lines
+
+    def _worst(self) -> str:
+        """The signals of which the model leaves more than noise."""
+        pressures = [f"pressures_{name}" for name, left in zip(CHAMBERS, self.left_over, strict=True) if left > MISFIT]
+        return ", ".join([*pressures, *(["the positions"] if self.misfit[1] > MISFIT else [])]) or "the pressures"
+
+    def _forms(self) -> str:
+        """What may be of another form, by the signal that fits worse."""
+        if self.misfit[1] > self.misfit[0]:
+            return (
+                'friction of another law, such as friction.law = "gms", or along the stroke, a bore or a lever measured wrong'
+            )
+        return "leaks, spools of second order, commands that are late, a curve of the valves or a tube that it does not know"
+
+    def _encoders(self) -> list[str]:
+        """What the zeros of encoders are off, a line each."""
+        lines = []
+        for k, (off, deviation, before) in enumerate(zip(*self.zeros, self.known_zeros, strict=True)):
+            reach = f"{1e3 * off:.3g} +- {1e3 * NORMAL * deviation:.2g} mm"
+            told = "" if deviation < DETERMINED * before else f": no more than what was known, +- {2e3 * before:.2g} mm"
+            lines.append(f"the encoder of cylinder {k + 1} counts {reach} too much{told}")
         return lines
 
     def _causes(self) -> list[str]:
@@ -164,19 +195,27 @@ MISFIT = 1.1
 UNLIKE = 1.25
 """A chamber is named whose residuals, over its noise, are so many times the median of all four; assumed."""
 
+MOST_FORMS = 2
+"""Times that forms are looked for which the log shows."""
+
 BIASED, LEAST_BIAS = 3.0, 5e3
 """Standard deviations and Pa from which the bias of a cell is named."""
 
 
-REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance", "mechanics.mode_frequency")
+REMEMBER = ("mechanics.mode_frequency",)
 """Options of a rig with states that no log holds at the start of a window."""
 
 
 def identify(
-    trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
+    trial: Trial,
+    owner: Parameters,
+    seed: int = 0,
+    free: tuple[FreeParameter, ...] | None = None,
+    tick: Tick = lambda: None,
 ) -> Identified:
     """The rig of a trial, as far as the trial determines it; all else is the owner's.
 
+    Without ``free``, what a rig as its owner's has is identified, and what else the log shows (``forms``).
     Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
     of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
     ``REMEMBER``.
@@ -184,25 +223,47 @@ def identify(
     given = [name for name in REMEMBER if value_of(owner, name)]
     if given:
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
-    whole = fit(trial, owner, seed, free, tick)
+    asked = free_of(owner, trial.latency) if free is None else free
+    whole = fit(trial, owner, seed, asked, tick)
+    more = () if free is not None else shown_by(owner)
+    for _ in range(MOST_FORMS):
+        with whole.problem.explained():
+            values = shown(whole, tuple(one for one in more if one not in whole.free))
+        if not values or whole.problem.windows.budget.over:
+            break
+        every = with_more(whole.free, (one for one in more if one.name in values))
+        whole = refine(trial, replace(whole, rig=whole.rig.replace(values)), owner, every, tick)
+    free = whole.free
     with whole.problem.explained():
-        certainty, pull = certainty_of(whole), force_offset(whole)
+        certainty, pull, others = (
+            certainty_of(whole),
+            force_offset(whole),
+            suspects(whole),
+        )
+    zeros = whole.problem.offsets.encoders(whole.jacobian[: -len(free)], whole.covariance)
+    before = np.empty(0) if trial.counted is None else trial.counted
     found = tuple(one for one, known in zip(free, certainty.determined, strict=True) if known)
-    last = whole if len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
+    over = whole.problem.windows.budget.over
+    whole = replace(whole, ended=whole.ended and not over)
+    last = whole if over or len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
     rig = last.rig if found else owner
     rows = []
     for one, theta, deviation, known in zip(free, whole.theta, certainty.deviation, certainty.determined, strict=True):
         value = value_of(rig, one.name)
         middle, reach = (one.prior.coordinate(value) if known else float(theta)), NORMAL * float(deviation)
-        if one.name == LATENCY and known:
+        if one.name == trial.latency and known:
             value, middle, reach = _latency(one, trial.period, middle, float(deviation))
         low, high = one.prior.value(middle - reach), one.prior.value(middle + reach)
         low = max(low, DECLARED[one.name].least)
         rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(known)))
     changes = {row.name: row.value for row in rows if row.determined}
-    noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
+    seen = "position_noise" if trial.counted is None else "encoder_noise"
+    noise = {"electronics.pressure_noise": last.noise.pressure, f"electronics.{seen}": last.noise.position}
     rig, quick = owner.replace({**changes, **noise}), guessed_noise(trial)
-    return Identified(tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left_over(last, trial))
+    left = left_over(last, trial)
+    return Identified(
+        tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left, tuple(others), zeros, before
+    )
 
 
 def left_over(found: Fit, trial: Trial) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from baselines.bench.resting import RestingRigs
 from baselines.controller import Controller
-from baselines.identification.experiment import Plan
+from baselines.identification.experiment import PNEUMATIC, Plan
 from baselines.identification.trial import Trial
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.loop.stage import Part
@@ -16,9 +16,6 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFNESS = 3000.0
 """N/m asked of the law in both directions; laws that know no stiffness ignore it."""
-
-PNEUMATIC = (4400.0, 2200.0)
-"""N/m asked of the pneumatic stiffness."""
 
 
 def run_plan(
@@ -57,8 +54,11 @@ def _run(
     count = int((plan.times[-1] - start) / period)
     openings, pressures, positions = np.empty((4, count)), np.empty((4, count)), np.empty((2, count))
 
+    stiffness = np.array([np.interp(start + period * np.arange(count + 1), plan.times, one) for one in plan.asked()])
+
     def follow(k: int) -> None:
         loop.asked[:8] = path.sample(np.full(1, start + k * period))
+        loop.asked[10:12, 0], loop.asked[12:14, 0] = stiffness[:, k], (stiffness[:, k + 1] - stiffness[:, k]) / period
 
     def add(k: int) -> None:
         added = plan.added[:, np.searchsorted(plan.times, start + k * period + 1e-9) - 1]
@@ -76,4 +76,5 @@ def _run(
 
     loop.close([follow], [add], [*([carry(loop)] if carry else loop.pipeline.group("plant")), look])
     loop.run(count)
-    return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)))
+    counted = np.full(2, rig.electronics.encoder_offset) if sensors.startswith("encoders") else None
+    return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)), counted=counted)

@@ -32,6 +32,14 @@ COLUMNS = {
 PISTONS = ("piston_y1", "piston_y2")
 """Positions of both pistons from mid stroke, m, by encoders: they may stand in place of ``POSITIONS``."""
 
+COUNTED_COLUMNS = {
+    (PISTONS[POSITIONS.index(name)] if name in POSITIONS else name): (
+        Column("m", "position of the piston from mid stroke, as its encoder counts") if name in POSITIONS else column
+    )
+    for name, column in COLUMNS.items()
+}
+"""What a log of a simulated rig with encoders holds."""
+
 UNITS = {name: column.unit for name, column in COLUMNS.items()}
 COUNTED = {name: unit for name, unit in UNITS.items() if name not in POSITIONS} | dict.fromkeys(PISTONS, "m")
 """What is read of a log of a rig with encoders."""
@@ -71,6 +79,9 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
     chosen = Selection(table, units, mapping, OTHERS)
     if counted or (not any(name in chosen.used for name in POSITIONS) and set(PISTONS) <= set(table.columns)):
         units = COUNTED
+        chosen = Selection(table, units, mapping, OTHERS)
+    elif set(PISTONS) <= set(table.columns):
+        units = UNITS | COUNTED  # a tracker and encoders
         chosen = Selection(table, units, mapping, OTHERS)
     if not any(name in chosen.used or name in mapping for name in FORCES):
         chosen = Selection(table, units | recorded, mapping, OTHERS)

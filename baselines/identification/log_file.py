@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from baselines.identification.encoders import zeros_by_tracker
 from baselines.identification.log_columns import (
     COLUMNS,
+    COUNTED_COLUMNS,
     FORCES,
     OPENINGS,
     PISTONS,
@@ -20,7 +22,7 @@ from baselines.logs.log import Log, Series
 from baselines.logs.writing import WRITERS, write_log
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector
+from birthsim_env.physics.geometry import end_effector, inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 
 
@@ -29,11 +31,17 @@ def read_trial(path: Path, rig: Parameters, options: LogOptions = LogOptions()) 
     source, rows = read_columns(path, options)
     groups = (OPENINGS, PRESSURES, FORCES)
     openings, pressures, forces = (np.array([rows[name] for name in group]) for group in groups)
-    counted = PISTONS[0] in rows
-    positions = np.array([rows[name] for name in (PISTONS if counted else POSITIONS)])
-    if counted:
-        positions = _ends(source, positions, rig)
-    return checked_trial(source, Trial(rows["time"], openings, pressures, positions, forces), rig)
+    positions, known, notes = np.array([rows[name] for name in POSITIONS if name in rows]), None, tuple[str, ...]()
+    if PISTONS[0] in rows:
+        pistons = np.array([rows[name] for name in PISTONS])
+        ends, known = _ends(source, pistons, rig), np.full(2, rig.electronics.encoder_offset)
+        if len(positions):
+            zeros = zeros_by_tracker(rows["time"], pistons, positions, rig)
+            known, notes = zeros.deviation, (zeros.words(),)
+            ends = _ends(source, pistons - zeros.offset[:, None], rig)
+        positions = ends
+    trial = Trial(rows["time"], openings, pressures, positions, forces, notes=notes, counted=known)
+    return checked_trial(source, trial, rig)
 
 
 def _ends(source: str, pistons: Array, rig: Parameters) -> Array:
@@ -49,13 +57,16 @@ def _ends(source: str, pistons: Array, rig: Parameters) -> Array:
 
 def write_trial(trial: Trial, path: Path, rig: Parameters) -> None:
     """Write a trial of a simulated ``rig`` to a file .csv, .parquet or .mcap."""
-    rows = np.vstack([trial.times, trial.openings, trial.pressures, trial.positions, trial.forces])
+    columns, places = COLUMNS, trial.positions
+    if trial.counted is not None:
+        columns, places = COUNTED_COLUMNS, inverse_geometry(np.ascontiguousarray(places), rig)
+    rows = np.vstack([trial.times, trial.openings, trial.pressures, places, trial.forces])
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        lines = [",".join(COLUMNS), *(",".join(f"{value:.10g}" for value in row) for row in rows.T)]
+        lines = [",".join(columns), *(",".join(f"{value:.10g}" for value in row) for row in rows.T)]
         write_text(path, "\n".join(lines) + "\n")
     elif suffix in WRITERS:
-        values = dict(zip(COLUMNS, map(np.ascontiguousarray, rows), strict=True))
-        write_log(Log(dict(COLUMNS), [Series("/rig", trial.times, values)], [], {"rig": rig.to_dict()}), path)
+        values = dict(zip(columns, map(np.ascontiguousarray, rows), strict=True))
+        write_log(Log(dict(columns), [Series("/rig", trial.times, values)], [], {"rig": rig.to_dict()}), path)
     else:
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .csv, {', '.join(WRITERS)}")

@@ -18,9 +18,22 @@ SOME = 48
 """Samples among which the noise is taken for the same: a tracker's grows with the distance from its transmitter."""
 
 
+POOR = 2.5
+"""Residuals over the noise with which a search whose budget ends has found nothing; assumed."""
+
+
+def is_fitting(windows: Windows, residual: Array) -> bool:
+    """Whether residuals (W, R + F), over the noise, are those of a fit that tells something."""
+    counted = float(np.sum(windows.pressure_weights**2) + 2.0 * np.sum(windows.position_weights**2))
+    return float(np.sum(residual**2)) < POOR**2 * counted
+
+
 def guessed_noise(trial: Trial) -> Noise:
     """From third differences, which leave little of the motion."""
-    pressure, position = (noise_of(values) for values in (trial.pressures, trial.positions[:, fresh_rows(trial.positions)]))
+    seen = trial.positions[:, fresh_rows(trial.positions)]
+    # That of encoders is several times larger along one axis than along the other.
+    axes = [seen] if trial.counted is None else [axis[None] for axis in seen]
+    pressure, position = noise_of(trial.pressures), float(np.sqrt(np.mean([noise_of(one) ** 2 for one in axes])))
     return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
 
 

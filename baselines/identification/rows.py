@@ -96,7 +96,7 @@ def _checked(grid: Grid, raw: Trial, rig: Parameters) -> Trial:
     if np.ptp(hand, axis=1).max() == 0 and np.any(hand):
         notes.append(f"the force is ({hand[0, 0]:g}, {hand[1, 0]:g}) N in every row, as of a sensor that hangs")
     unknown = long_runs(lacking, int(BRIDGED / grid.period) + 2)
-    return Trial(grid.times, driving, pressures, positions, hand, unknown, tuple(notes))
+    return Trial(grid.times, driving, pressures, positions, hand, unknown, (*raw.notes, *notes), raw.counted)
 
 
 def _without_repeats(grid: Grid, *signals: Array) -> Grid:

@@ -1,7 +1,8 @@
 """The start states of windows, eliminated: for given parameters each window begins where its measurements say.
 
-A start state has 14 free numbers, in the order of ``windows.FREE``. They are found by Gauss-Newton steps with what is known of
-them beforehand, ``SPREAD`` about the guess, in the measurements' company: rows of residuals over their standard deviations.
+A start state has F free numbers, 14 in the order of ``windows.FREE``, and more of a rig with options. They are found by
+Gauss-Newton steps with what is known of them beforehand, ``Windows.spread`` about the guess, in the measurements' company: rows
+of residuals over their standard deviations.
 """
 
 from __future__ import annotations
@@ -13,16 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.identification.prediction import predict
-from baselines.identification.windows import FREE, Windows, coulomb_levels_of
-from birthsim_env.physics.compiled import lanes as at
+from baselines.identification.windows import BRISTLES, FREE, Windows, coulomb_levels_of
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
-SPREAD = np.array([5e-3, 0.1, 5e-3, 0.1, 2e-4, 2e-4, *[2e4] * 4, *[12.0] * 4])
-"""m, m/s, m, m/s, bristles m, Pa, K: standard deviations of a start state about its guess, assumed."""
-
 DIFFERENCE = 1e-4
-"""Step of differences, in ``SPREAD``."""
+"""Step of differences, in ``Windows.spread``."""
 
 CLOSE = 1e-2
 """Where a step moves every window's start by less than this many standard deviations the search ends."""
@@ -35,7 +32,6 @@ MOST_STEPS = 8
 WORSE = 1.15
 """A window whose residuals are so many times the median is begun anew; of 1100 numbers chance makes 1.1."""
 
-BRISTLES = (at.Z1, at.Z2)
 BRISTLE_ROWS = tuple(FREE.index(row) for row in BRISTLES)
 
 
@@ -55,29 +51,30 @@ def residuals(windows: Windows, noise: Noise, pressures: Array, positions: Array
     return np.concatenate([first.reshape(shape), second.reshape(shape)], axis=2)
 
 
-def states_of(windows: Windows, free: Array) -> Array:
-    """Start states (18, V, W) from free ones (V, W, 14) in units of ``SPREAD`` about the guess."""
+def states_of(windows: Windows, rigs: list[Parameters], free: Array) -> Array:
+    """Start states (S, V, W) of V rigs from free ones (V, W, F) in units of ``Windows.spread`` about the guess."""
     states = np.repeat(windows.state[:, None], len(free), axis=1)
-    states[list(FREE)] += (free * SPREAD).transpose(2, 0, 1)
+    states[list(windows.free)] += (free * windows.spread).transpose(2, 0, 1)
+    states[list(BRISTLES)] *= windows.stiffness / np.array([rig.friction.bristle_stiffness for rig in rigs])[:, None]
     return states
 
 
 def predicted(windows: Windows, noise: Noise, rigs: list[Parameters], free: Array) -> Array:
-    """Residuals (V, W, R + 14) for V rigs and free start states (V, W, 14)."""
-    pressures, positions, _ = predict(windows, rigs, states_of(windows, free))
+    """Residuals (V, W, R + F) for V rigs and free start states (V, W, F)."""
+    pressures, positions, _ = predict(windows, rigs, states_of(windows, rigs, free))
     return np.concatenate([residuals(windows, noise, pressures, positions), -free], axis=2)
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """How residuals (W, R + 14) follow the free start states: an orthonormal basis (W, R + 14, 14) of what these can explain,
-    and a triangle (W, 14, 14) with basis @ triangle the derivatives."""
+    """How residuals (W, R + F) follow the free start states: an orthonormal basis (W, R + F, 14) of what these can explain,
+    and a triangle (W, F, 14) with basis @ triangle the derivatives."""
 
     basis: Array
     triangle: Array
 
     def step(self, residual: Array) -> tuple[Array, Array]:
-        """Gauss-Newton steps (W, 14) for residuals (W, R + 14), and their lengths (W,) in standard deviations."""
+        """Gauss-Newton steps (W, F) for residuals (W, R + F), and their lengths (W,) in standard deviations."""
         along = self.explained(residual[..., None])
         step = np.asarray(-np.linalg.solve(self.triangle, along)[..., 0], dtype=np.float64)
         return step, np.asarray(np.linalg.norm(along[..., 0], axis=1))
@@ -87,29 +84,29 @@ class Slopes:
         return Slopes(self.basis[chosen], self.triangle[chosen])
 
     def explained(self, columns: Array) -> Array:
-        """Coordinates (W, 14, C) in the basis of columns (W, R + 14, C)."""
+        """Coordinates (W, F, C) in the basis of columns (W, R + F, C)."""
         return np.asarray(self.basis.transpose(0, 2, 1) @ columns)
 
     def unexplained(self, columns: Array) -> Array:
-        """What start states cannot explain of columns (W, R + 14, C)."""
+        """What start states cannot explain of columns (W, R + F, C)."""
         return np.asarray(columns - self.basis @ self.explained(columns))
 
 
 def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Slopes:
-    """The slopes at start states ``free`` (W, 14)."""
-    count = len(FREE)
+    """The slopes at start states ``free`` (W, F)."""
+    count = len(windows.free)
     several = np.repeat(free[None], 1 + count, axis=0)
     several[1:] += DIFFERENCE * np.eye(count)[:, None]
     found = predicted(windows, noise, [rig] * (1 + count), several)
     slopes = np.ascontiguousarray((found[1:] - found[0]).transpose(1, 2, 0)) / DIFFERENCE
-    # Cholesky's triangle is that of QR in a tenth of the time; the rows of ``SPREAD`` keep the matrix well conditioned.
+    # Cholesky's triangle is that of QR in a tenth of the time; the rows of the guess keep the matrix well conditioned.
     triangle = np.linalg.cholesky(slopes.transpose(0, 2, 1) @ slopes).transpose(0, 2, 1)
     basis = slopes @ np.linalg.inv(triangle)
     return Slopes(np.asarray(basis, dtype=np.float64), np.asarray(triangle, dtype=np.float64))
 
 
 def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes: Slopes | None) -> tuple[Array, Array]:
-    """Start states (W, 14) that fit best under a rig, and residuals (W, R + 14) with them.
+    """Start states (W, F) that fit best under a rig, and residuals (W, R + F) with them.
 
     The search goes on from ``free``, first with given ``slopes``. A window that a step does not make better takes a shorter
     one, and one whose steps do not shrink gets new slopes.
@@ -136,13 +133,13 @@ def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes:
 
 
 def outliers(residual: Array) -> NDArray[np.bool_]:
-    """Windows (W,) whose residuals (W, R + 14) are more than ``WORSE`` times those of the median window."""
+    """Windows (W,) whose residuals (W, R + F) are more than ``WORSE`` times those of the median window."""
     costs = np.sum(residual**2, axis=1)
     return np.asarray(~(costs <= WORSE * np.median(costs)))
 
 
 def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Array:
-    """Start states (W, 14) that fit a rig at least as well as what ``free`` leads to.
+    """Start states (W, F) that fit a rig at least as well as what ``free`` leads to.
 
     A guess from measurements may have a bristle bent the wrong way, from which no small step leads out. The ``outliers``
     are tried from where the window before ends, and with all signs of both bristles.
@@ -152,16 +149,16 @@ def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> 
     bad = np.flatnonzero(outliers(residual))
     if not len(bad):
         return best
-    _, _, ends = predict(windows, [rig], states_of(windows, best[None]))
-    before = (ends[:, 0] - np.roll(windows.state, -1, axis=1))[list(FREE)] / SPREAD[:, None]
+    _, _, ends = predict(windows, [rig], states_of(windows, [rig], best[None]))
+    ends[list(BRISTLES)] *= rig.friction.bristle_stiffness / windows.stiffness
+    before = (ends[:, 0] - np.roll(windows.state, -1, axis=1))[list(windows.free)] / windows.spread[:, None]
     part, tries = windows.some(bad), [np.nan_to_num(np.roll(before, 1, axis=1).T[bad])]
-    column = parameter_column(rig)
-    levels = coulomb_levels_of(part.state, column)
+    levels = coulomb_levels_of(part.state, parameter_column(rig))
     signs_of_both = itertools.product((-1.0, 0.0, 1.0), repeat=2)
     for signs, others in itertools.product(signs_of_both, (best[bad], np.zeros_like(best[bad]))):
         bent = others.copy()
         for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, levels, signs, strict=True):
-            bent[:, free_row] = (sign * level / column[at.S0] - part.state[row]) / SPREAD[free_row]
+            bent[:, free_row] = (sign * level / windows.stiffness - part.state[row]) / windows.spread[free_row]
         tries.append(bent)
     found, left = settle(windows.some(np.tile(bad, len(tries))), noise, rig, np.concatenate(tries), None)
     cost = np.sum(left**2, axis=1).reshape(len(tries), -1)

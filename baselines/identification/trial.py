@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from birthsim_env.physics.compiled.lanes import Array
 
+TRACKER, ENCODERS = "electronics.position_latency", "electronics.encoder_latency"
+"""How late a position is, of a tracker and of encoders."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -16,7 +19,8 @@ class Trial:
 
     Pressures and positions are NaN where they were not measured. Openings and forces move the simulated rig and are always
     numbers; where the log lacks them for so long that they cannot be bridged, ``unknown`` (T,) is True. ``notes`` say in a
-    line each what of the log was left out.
+    line each what of the log was left out. Where encoders have counted the positions, ``counted`` (2,) is how well their zeros
+    are known before, m, and positions are those at which the linkage ends.
     """
 
     times: Array
@@ -26,6 +30,12 @@ class Trial:
     forces: Array
     unknown: NDArray[np.bool_] | None = None
     notes: tuple[str, ...] = ()
+    counted: Array | None = None
+
+    @property
+    def latency(self) -> str:
+        """The parameter that says how late positions are."""
+        return TRACKER if self.counted is None else ENCODERS
 
     @property
     def period(self) -> float:

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter, savgol_filter
 
 from baselines.identification.budget import Budget
+from baselines.identification.tracks import admit_rows
 from baselines.identification.trial import Trial, bridged, fresh_rows, numbers
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.dynamics import coulomb_levels, steps_in
 from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.spools import admit_lanes, are_perfect
+from birthsim_env.physics.rig.parameters import Parameters, value_of
+from birthsim_env.physics.spools import are_perfect
 
 LENGTH = 0.25
 """s of a window."""
@@ -39,6 +40,22 @@ ENOUGH = 0.5
 FREE = (at.Y1, at.V1, at.Y2, at.V2, at.Z1, at.Z2, at.PP1, at.PN1, at.PP2, at.PN2, at.TP1, at.TN1, at.TP2, at.TN2)
 """Rows of the state that a window's start leaves free; the spools follow from the openings before it."""
 
+SUPPLY, ENDS = at.STATES, tuple(range(at.STATES + 1, at.STATES + 5))
+"""Further rows of the state of a rig with options: pressures of the supply and at the valves' ends of the four tubes."""
+
+BRISTLES = (at.Z1, at.Z2)
+"""Rows that follow a rig's bristle stiffness, which may be ten times another's, so that bristles carry the same force."""
+
+SPREADS = {
+    **dict.fromkeys((at.Y1, at.Y2), 5e-3),
+    **dict.fromkeys((at.V1, at.V2), 0.1),
+    **dict.fromkeys(BRISTLES, 10.0),
+    **dict.fromkeys(at.PRESSURES, 2e4),
+    **dict.fromkeys(at.TEMPERATURES, 12.0),
+    **dict.fromkeys((SUPPLY, *ENDS), 5e4),
+}
+"""m, m/s, Pa, K, and N of what bristles carry: standard deviations of a start state about its guess, assumed."""
+
 
 @dataclass(frozen=True)
 class Windows:
@@ -46,8 +63,10 @@ class Windows:
 
     ``starts`` (W,) are rows of the trial. ``arrived`` (W, F) counts the periods from the start to each row at which a position
     sample newly arrived, and ``valid`` (W, F) is False beyond the last. ``pressures`` (W, K, 4) and ``positions`` (W, F, 2) are
-    the measurements, ``state`` (18, W) the guess of the start. Residuals count with ``pressure_weights`` (W, K, 4) and
+    the measurements, ``state`` (S, W) the guess of the start, of which rows ``free`` are sought.
+    Residuals count with ``pressure_weights`` (W, K, 4) and
     ``position_weights`` (W, F), which are 0 where nothing was measured. ``budget`` bounds how often they are predicted.
+    ``stiffness``, N/m, is that of the bristles whose deflections ``state`` has.
     """
 
     trial: Trial
@@ -61,6 +80,17 @@ class Windows:
     pressure_weights: Array
     position_weights: Array
     budget: Budget
+    free: tuple[int, ...] = FREE
+    stiffness: float = 5e4
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviations (F,) of a start state about its guess."""
+        return np.array([SPREADS[row] / (self.stiffness if row in BRISTLES else 1.0) for row in self.free])
+
+    def latency_of(self, rig: Parameters) -> float:
+        """s by which positions of a rig arrive late."""
+        return late(self.trial, rig)
 
     def some(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Windows:
         """The windows with the numbers ``chosen``, or where ``chosen`` (W,) is True."""
@@ -76,7 +106,14 @@ class Windows:
             self.pressure_weights[chosen],
             self.position_weights[chosen],
             self.budget,
+            self.free,
+            self.stiffness,
         )
+
+
+def late(trial: Trial, rig: Parameters) -> float:
+    """s by which the positions of a trial arrive late."""
+    return float(value_of(rig, trial.latency))
 
 
 def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | None = None) -> Windows:
@@ -87,7 +124,7 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
     period, rows = trial.period, len(trial.times)
     k, margin = max(8, round(length / period)), round(0.1 / period)
     fresh = fresh_rows(trial.positions)
-    lag = round(rig.electronics.position_latency / period)
+    lag = round(late(trial, rig) / period)
     starts = _measured(trial, np.arange(margin, rows - margin - k, k), k, lag, fresh)
     own = [fresh[(fresh >= start + lag) & (fresh < start + k + lag)] for start in starts]
     most = max(map(len, own))
@@ -109,7 +146,26 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
         known.astype(np.float64),
         valid.astype(np.float64),
         budget or Budget.of(trial),
+        free_rows(rig),
+        rig.friction.bristle_stiffness,
     )
+
+
+def has_options(rig: Parameters) -> bool:
+    """Whether the state of a rig has further rows."""
+    return bool(rig.chambers.tube_length or rig.air.supply_conductance or rig.friction.law == "gms")
+
+
+def _further(state: Array, rig: Parameters) -> Array:
+    """The further rows (1 + 4, W) of states (18, W): the rig's supply, and at both ends of a tube the same pressure."""
+    supply = np.full((1, state.shape[1]), rig.air.supply_pressure)
+    return np.concatenate([supply, state[list(at.PRESSURES)]])
+
+
+def free_rows(rig: Parameters) -> tuple[int, ...]:
+    """Rows of a rig's state that a window's start leaves free."""
+    supply = (SUPPLY,) if rig.air.supply_conductance else ()
+    return (*FREE, *supply, *(ENDS if rig.chambers.tube_length else ()))
 
 
 def _measured(trial: Trial, starts: NDArray[np.intp], k: int, lag: int, fresh: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -136,11 +192,11 @@ def _before(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArray[np.intp]) -> Array:
-    """Start states (18, W): local parabolas through positions and pressures, bristles of steady sliding, air as warm as the
-    walls."""
+    """Start states (S, W): local parabolas through positions and pressures, bristles of steady sliding, air as warm as the
+    walls, the same pressure at both ends of a tube."""
     period, column = trial.period, parameter_column(rig)
     state = np.zeros((at.STATES, len(starts)))
-    taken = trial.times[fresh] - rig.electronics.position_latency
+    taken = trial.times[fresh] - late(trial, rig)
     motion = np.empty((4, len(starts)))
     for w, now in enumerate(trial.times[starts]):
         near = np.abs(taken - now) <= max(SMOOTHED, 4 * period)
@@ -155,7 +211,7 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     state[list(at.PRESSURES)] = smooth[:, starts]
     state[[at.Z1, at.Z2]] = np.tanh(state[[at.V1, at.V2]] / 0.01) * coulomb_levels_of(state, column) / column[at.S0]
     state[list(at.TEMPERATURES)] = column[at.TEMPERATURE]
-    return state
+    return np.concatenate([state, _further(state, rig)]) if has_options(rig) else state
 
 
 def coulomb_levels_of(state: Array, column: Array) -> Array:
@@ -178,15 +234,15 @@ def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: fl
     spools of a ``rate``, 1/s."""
     steps = steps_in(period)
     h = period / steps * rate
-    kept = (1.0 - h * (1.0 - h * (0.5 - h * (1.0 / 6.0 - h / 24.0)))) ** steps
+    kept = (1.0 - h * (1.0 - h * (0.5 - h / 6.0))) ** steps
     before = np.concatenate([np.zeros((4, 1)), openings[:, :-1]], axis=1)
     return np.asarray(lfilter([1.0 - kept], [1.0, -kept], before, axis=1)[:, starts])
 
 
 def admitted_openings(trial: Trial, column: Array) -> Array:
-    """What the openings of a log (4, T) become behind the limit of the valves."""
+    """What the openings of a log (4, T) become behind play and limit of the valves; a play begins in its middle."""
     if are_perfect(column[:, None]):
         return trial.openings
-    lanes, opening = trial.openings.shape[1], np.empty_like(trial.openings)
-    admit_lanes(trial.openings, np.repeat(column[:, None], lanes, axis=1), np.zeros((4, lanes)), opening)
+    opening = np.empty_like(trial.openings)
+    admit_rows(np.ascontiguousarray(trial.openings), column[:, None].copy(), opening)
     return opening

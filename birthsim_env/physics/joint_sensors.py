@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from birthsim_env.physics.rig.declaration import Section, parameter
+from birthsim_env.physics.rig.declaration import Prior, Section, parameter
 
 EITHER_WAY = "an episode draws up to this either way"
 
@@ -41,6 +41,7 @@ class JointSensors(Section, plant=False, shared=True):
         least=0,
         most=0.05,
         range=(0, 1e-3),
+        identified=Prior(1.0, scale=0.001),
         option=True,
     )
     encoder_noise: float = parameter(

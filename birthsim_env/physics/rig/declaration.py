@@ -34,11 +34,15 @@ class Prior:
         What the value cannot fall to, in its own unit.
     scale : float
         What the value is counted in, for a value that may be zero, in its own unit.
+    needs : str
+        Parameter of the same section whose value in the owner's rig is another than its default's, or this one is not looked
+        for; one that needs itself and has a ``scale`` is also looked for where a log shows that it is there.
     """
 
     spread: float
     floor: float = 0.0
     scale: float = 0.0
+    needs: str = ""
 
     def coordinate(self, value: float) -> float:
         """The coordinate of a value."""

@@ -73,6 +73,7 @@ class Cylinder(Section):
         least=0,
         most=1e-3,
         range=(2e-6, 1.2e-5),
+        identified=Prior(4.0, scale=1e-6),
         row="fp",
     )
     direction_asymmetry: float = parameter(
@@ -85,6 +86,7 @@ class Cylinder(Section):
         option=True,
         range=(-0.2, 0.2),
         on_request=True,
+        identified=Prior(2.0, scale=0.1, needs="direction_asymmetry"),
         row="asymmetry",
     )
     viscous_friction: float = parameter(
@@ -237,7 +239,7 @@ class Friction(Section):
         most=5e5,
         range=(5e3, 5e5),
         logarithmic=True,
-        identified=Prior(0.7),
+        identified=Prior(1.2),
         row="s0",
     )
     bristle_damping: float = parameter(

@@ -61,6 +61,7 @@ class Chambers(Section):
         option=True,
         range=(0.5, 3),
         on_request=True,
+        identified=Prior(0.3, needs="tube_length"),
     )
     tube_diameter: float = parameter(
         "m",
@@ -72,6 +73,7 @@ class Chambers(Section):
         option=True,
         range=(0.0025, 0.006),
         on_request=True,
+        identified=Prior(0.2, needs="tube_length"),
     )
     pressure_cells: str = parameter(
         "-",

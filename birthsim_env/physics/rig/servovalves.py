@@ -143,6 +143,7 @@ class Valves(Section):
         option=True,
         range=(0.9, 1.1),
         on_request=True,
+        identified=Prior(1.0, scale=0.1, needs="exhaust_ratio"),
         row=None,
     )
     crossing: float = parameter(
@@ -164,6 +165,7 @@ class Valves(Section):
         option=True,
         range=(0, 0.02),
         on_request=True,
+        identified=Prior(2.0, scale=0.01, needs="hysteresis"),
         row="play",
     )
     opening_limit: float = parameter(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.statistics import quantile
-from baselines.identification.free_parameters import FREE_PARAMETERS
+from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY
 from baselines.work.tasks import Task
 from birthsim_env.parts.drawn.randomization import Ranges
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
@@ -49,9 +49,10 @@ def recovery_table(results: list[dict[str, Any]], ranges: Ranges = RANGES) -> li
         rows = [result["rows"][one.name] for result in results]
         told = [row for row in rows if row["told"]]
         low, high = ranges.get(one.name, 2 * [value_of(Parameters(), one.name)])
-        scale, unit, digits = (1e3, "ms", 2) if one.prior.scale else (100.0, "%", 2)
-        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.prior.scale else row["true"]) for row in told]
-        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.prior.scale else row["true"]) for row in told]
+        late = one.name == LATENCY
+        scale, unit, digits = (1e3, "ms", 2) if late else (100.0, "%", 2)
+        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if late else row["true"]) for row in told]
+        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if late else row["true"]) for row in told]
         cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
         inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
         written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)

@@ -19,20 +19,23 @@ RANGES: dict[str, tuple[float, float]] = {
     **{
         name: _DOCUMENTED[name]
         for name in (
-            "cylinder1.coulomb_friction", "cylinder1.viscous_friction", "cylinder2.coulomb_friction",
-            "cylinder2.viscous_friction", "mechanics.mass", "chambers.dead_volume", "chambers.wall_heat_transfer",
-            "valves.time_constant", "electronics.position_latency", "electronics.position_noise", "electronics.pressure_noise",
+            "cylinder1.coulomb_friction", "cylinder1.pressure_friction", "cylinder1.viscous_friction",
+            "cylinder2.coulomb_friction", "cylinder2.pressure_friction", "cylinder2.viscous_friction",
+            "friction.bristle_stiffness", "mechanics.mass", "chambers.dead_volume", "chambers.wall_heat_transfer",
+            "valves.time_constant", "valves.supply_overlap", "valves.supply_curvature", "valves.exhaust_overlap",
+            "valves.exhaust_curvature", "electronics.position_latency", "electronics.position_noise",
+            "electronics.pressure_noise",
         )
     },
     "friction.static_ratio": (1.1, 1.6),
     "friction.stribeck_speed": (0.008, 0.03),
-    "friction.bristle_stiffness": (3e4, 8e4),
     "friction.bristle_damping": (80.0, 250.0),
     "valves.sonic_conductance": (2.9e-9, 4.9e-9),
     "valves.critical_ratio": (0.2, 0.4),
     "valves.leakage_ratio": (0.002, 0.012),
 }  # fmt: skip
-"""What is drawn, uniformly: the documented ranges, and for the rest ranges about the default; assumed."""
+"""What is drawn: the documented ranges, the stiffness of bristles by its logarithm, and for the rest ranges about the default,
+assumed."""
 
 SENSORS = "lab"
 
