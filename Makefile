@@ -261,7 +261,7 @@ fuzz: $(READY)
 	HYPOTHESIS_PROFILE=deep nice $(BIN)/python -m pytest -v --hypothesis-seed=$${SEED:-0} tests/fuzz
 
 # mutmut leaves functions with decorators alone: in the copy those files' kernels have none, and all are plain Python. Tests that
-# take long without machine code are skipped. MUTANTS="birthsim_env.physics.valves*" names some.
+# take long without machine code are skipped. MUTANTS="birthsim_env.physics.pneumatics.valves*" names some.
 mutation: $(READY)
 	test -x $(MUTMUT)/bin/mutmut || { python3 -m venv $(MUTMUT) && echo "$(CURDIR)/$(VENV)/lib/$$(ls $(VENV)/lib)/site-packages" > \
 	  $(MUTMUT)/lib/$$(ls $(MUTMUT)/lib)/site-packages/project.pth && $(MUTMUT)/bin/pip install --quiet mutmut==3.8.1; }

@@ -2,11 +2,12 @@
 
 from typing import NamedTuple
 
-from birthsim_env.physics import control_model, valves
-from birthsim_env.physics.characteristic import Edge, largest_part, opened_part
+from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.pneumatics import valves
+from birthsim_env.physics.pneumatics.characteristic import Edge, largest_part, opened_part
 
 CLEARANCE = 0.002
 """m; assumed: no chamber counts as shorter. Near an end stop a sensor may place the piston outside its stroke, where (9) has no

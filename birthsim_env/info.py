@@ -6,11 +6,12 @@ import numpy as np
 
 from birthsim_env.loop.rows import Signals, World
 from birthsim_env.loop.signals import compliant_offset
-from birthsim_env.physics import air, control_model, tubes
+from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
+from birthsim_env.physics.pneumatics import air, tubes
 
 
 class Info(Rows):

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from birthsim_env.loop.rows import Signals, fill_measurement
 from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, compliant_offset
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage import geometry, mechanics
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 
 LIMIT = 10.0
 """Bound of every observation entry, in units of its scale."""

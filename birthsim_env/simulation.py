@@ -26,7 +26,7 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import plain
 from birthsim_env.physics.strength import require_carried

@@ -25,7 +25,7 @@ from birthsim_env.parts.references import Circle, FixedTarget, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import theta1
+from birthsim_env.physics.linkage.geometry import theta1
 from birthsim_env.physics.rig.parameters import Parameters
 
 FRICTIONLESS = {f"cylinder{i}.{name}": 0.0 for i in (1, 2) for name in ("coulomb_friction", "pressure_friction")}

@@ -12,11 +12,11 @@ residual. It then works with less stiffness, until the swing has died.
 from baselines.backstepping.cartesian_law import across, along
 from baselines.estimation.hand.half_wave import HalfWave, sustained
 from birthsim_env.loop.signals import Joints, Reference
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
+from birthsim_env.physics.linkage import geometry
 
 LEVEL = 0.1
 """m/s of the speed error; smaller half waves do not count. As in ``admittance-backstepping``."""

@@ -14,9 +14,9 @@ from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference, compliance
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.observation import Entry
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.records import Rows, rows
+from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.rig.parameters import Parameters
 
 

@@ -5,11 +5,11 @@ turns. What was met when the piston last moved out and in tells weight and frict
 """
 
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
+from birthsim_env.physics.linkage import geometry
 
 BANDWIDTH = 60.0
 """1/s, of the observer where speeds are measured; assumed."""

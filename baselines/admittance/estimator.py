@@ -29,10 +29,10 @@ from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Point
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.rig.parameters import Parameters
 
 BELIEVED_LIMIT, BELIEVED_HAND = 120.0, 400.0

@@ -24,10 +24,10 @@ from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Motion
 from birthsim_env.loop.stage import block, scratch
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.dynamics import load
+from birthsim_env.physics.linkage import geometry, mechanics
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""

@@ -18,10 +18,10 @@ from baselines.estimation.stages import PistonEstimate
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Numbers, number, part
+from birthsim_env.physics.linkage import geometry, mechanics
 
 
 @helper

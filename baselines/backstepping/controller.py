@@ -22,8 +22,8 @@ from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, part
-from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.inverse_kinematics import piston_reference
+from birthsim_env.physics.linkage.geometry import jacobian
+from birthsim_env.physics.linkage.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, plain, shown
 from birthsim_env.registry import register

@@ -16,7 +16,7 @@ from baselines.impedance import Impedance, matrix_root, stiffness_matrix
 from birthsim_env.loop.guard import require_good
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry, jacobian
+from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian
 from birthsim_env.physics.rig.parameters import Parameters
 
 

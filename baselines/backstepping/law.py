@@ -26,12 +26,12 @@ from baselines.valve_inverse import (
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.dynamics import load
-from birthsim_env.physics.inverse_kinematics import piston_reference
+from birthsim_env.physics.linkage import geometry, mechanics
+from birthsim_env.physics.linkage.inverse_kinematics import piston_reference
 
 
 class Options(Numbers):

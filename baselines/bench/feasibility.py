@@ -14,7 +14,7 @@ from birthsim_env.parts.hands.user_forces import forces_of
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry, jacobian
+from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian
 
 STEP = 0.05
 """s between the instants that are looked at."""

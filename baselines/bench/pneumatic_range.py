@@ -3,7 +3,7 @@
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.linkage.geometry import inverse_geometry, joint_force
 from birthsim_env.physics.rig.parameters import Parameters
 
 

@@ -16,7 +16,7 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Simulation

@@ -8,11 +8,12 @@ so that noise is averaged over 1/w without the delay of a filter: only the model
 
 from baselines.valve_inverse import driving_flows, valve_of
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics import control_model, valves
+from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
+from birthsim_env.physics.pneumatics import valves
 
 
 @helper

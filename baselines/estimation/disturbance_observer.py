@@ -8,10 +8,10 @@ the compliance error in disguise.
 
 from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from birthsim_env.loop.signals import Joints, PerChamber, Point
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage import geometry, mechanics
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 
 
 @helper

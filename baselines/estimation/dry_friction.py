@@ -1,8 +1,8 @@
 """The Coulomb friction that is believed of a piston: of the rig as described, at the pressures of its chambers as measured."""
 
-from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.seals import friction
 
 
 @helper

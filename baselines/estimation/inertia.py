@@ -12,10 +12,10 @@ mass above m0 is not learned. A rig that is lighter than believed swings, and by
 
 from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from birthsim_env.loop.signals import PerChamber
-from birthsim_env.physics import mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
+from birthsim_env.physics.linkage import mechanics
 
 LEAST = 0.25
 """assumed: every rig has at least this fraction of the believed mass."""

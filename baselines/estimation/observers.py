@@ -26,7 +26,7 @@ from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import piston_motion, pistons_at
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion, pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 
 BANDWIDTH = 70.0

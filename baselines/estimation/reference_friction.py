@@ -6,10 +6,10 @@ It is there before an observer sees it, and since it never looks at the measured
 from baselines.estimation import dry_friction
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
+from birthsim_env.physics.seals import friction
 
 
 @helper

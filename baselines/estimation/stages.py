@@ -12,7 +12,7 @@ from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector, inverse_geometry
+from birthsim_env.physics.linkage.geometry import end_effector, inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 
 STEP = 1e-6

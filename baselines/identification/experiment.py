@@ -19,7 +19,7 @@ from birthsim_env.parts.points import Through
 from birthsim_env.parts.stiffness_schedules import SOFTEST, STIFFEST
 from birthsim_env.parts.times import unit_of
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector
+from birthsim_env.physics.linkage.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
 from birthsim_env.tables.columns import LARGEST, columns

@@ -22,7 +22,7 @@ from baselines.logs.log import Log, Series
 from baselines.logs.writing import WRITERS, write_log
 from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector, inverse_geometry
+from birthsim_env.physics.linkage.geometry import end_effector, inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 
 

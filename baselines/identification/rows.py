@@ -25,7 +25,7 @@ from baselines.identification.units import (
     inside,
 )
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import workspace
+from birthsim_env.physics.linkage.geometry import workspace
 from birthsim_env.physics.rig.parameters import Parameters
 
 FEWEST = 50

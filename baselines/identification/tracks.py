@@ -10,8 +10,8 @@ from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import integrate, load, settle, store
-from birthsim_env.physics.geometry import end_effector_motion
-from birthsim_env.physics.spools import admit
+from birthsim_env.physics.linkage.geometry import end_effector_motion
+from birthsim_env.physics.pneumatics.spools import admit
 
 
 @kernel

@@ -11,7 +11,7 @@ from baselines.identification.log_columns import CHAMBERS
 from baselines.identification.timing import MOST
 from baselines.identification.trial import runs
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.linkage.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 
 OUTSIDE = 0.005

@@ -1,7 +1,7 @@
 """The characteristic of a valve from a measured table of openings and relative flows.
 
-A table does not reach the kernels: overlap, curvature and share of each edge do, fitted to it (``physics.characteristic`` says
-why). How far the form is from the table is told, and a table that it does not fit is refused.
+A table does not reach the kernels: overlap, curvature and share of each edge do, fitted to it; why, says
+``physics.pneumatics.characteristic``. How far the form is from the table is told, and a table that it does not fit is refused.
 """
 
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from birthsim_env.physics.characteristic import edge_of, opened_part
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.pneumatics.characteristic import edge_of, opened_part
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import MPYE_5_M5, Curve
 from birthsim_env.tables.reading import read_table

@@ -18,9 +18,9 @@ from baselines.identification.trial import Trial, bridged, fresh_rows, numbers
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.dynamics import coulomb_levels, steps_in
-from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.linkage.inverse_kinematics import pistons_at
+from birthsim_env.physics.pneumatics.spools import are_perfect
 from birthsim_env.physics.rig.parameters import Parameters, value_of
-from birthsim_env.physics.spools import are_perfect
 
 LENGTH = 0.25
 """s of a window."""

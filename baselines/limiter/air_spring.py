@@ -14,9 +14,10 @@ import math
 from baselines.valve_inverse import driving_flows, valve_of
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import InPlane, Joints
-from birthsim_env.physics import geometry, mechanics, valves
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.linkage import geometry, mechanics
+from birthsim_env.physics.pneumatics import valves
 
 RETURN = 0.02
 """s, time constant with which the air comes back; assumed, some times the valves' own."""

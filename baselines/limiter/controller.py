@@ -39,7 +39,7 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.dynamics import load
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number

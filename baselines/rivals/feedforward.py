@@ -15,11 +15,11 @@ from baselines.estimation.stages import PistonEstimate
 from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import InPlane
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
-from birthsim_env.physics.inverse_kinematics import piston_reference
+from birthsim_env.physics.linkage import geometry
+from birthsim_env.physics.linkage.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 
 SIGN_WIDTH = 0.01

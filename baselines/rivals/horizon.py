@@ -19,11 +19,12 @@ from birthsim_env.gradients.symbols import empty, inputs
 from birthsim_env.gradients.tracing import call
 from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
 from birthsim_env.physics.dynamics import load
+from birthsim_env.physics.linkage import geometry, mechanics
 
 NODES = 7
 """Nodes of the horizon."""

@@ -19,10 +19,10 @@ from baselines.rivals.feedforward import Tracking
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
 from baselines.valve_inverse import CylinderAir, air_at, driving_flows, valve_of
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics import valves
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Numbers, number, part
+from birthsim_env.physics.pneumatics import valves
 from birthsim_env.registry import register
 
 

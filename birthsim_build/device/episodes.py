@@ -21,7 +21,7 @@ from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.loop.world import AT_PLACE, Start
 from birthsim_env.parts.drawn.seeding import STREAMS, stream_key
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.registry import register
 
 

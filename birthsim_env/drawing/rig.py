@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from birthsim_env.drawing.pen import CAP, FAINT, INK, PAPER, SKIN, SKIN_EDGE, STEEL, Axis, Colour, Pen, Point
-from birthsim_env.physics import geometry
+from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 
 _NEAR_STOP = 1e-4  # m

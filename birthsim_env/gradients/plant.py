@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from birthsim_env.gradients import steps
 from birthsim_env.gradients.right_hand_side import EVERY, INPUTS, RIG
-from birthsim_env.physics import dynamics, options, spools
+from birthsim_env.physics import dynamics, options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant, checked
+from birthsim_env.physics.pneumatics import spools
 
 
 @dataclass(frozen=True)

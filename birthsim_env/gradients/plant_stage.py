@@ -18,7 +18,7 @@ from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES
-from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.linkage.geometry import end_effector_motion
 from birthsim_env.physics.runge_kutta import STAGES
 
 ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]

@@ -29,7 +29,7 @@ from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
-from birthsim_env.physics.geometry import end_effector
+from birthsim_env.physics.linkage.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 
 SIGNALS = ("time", "position", "velocity", "acceleration", "Pp1", "Pn1", "Pp2", "Pn2", "user_force", "reference")

@@ -6,14 +6,15 @@ from birthsim_env.loop.integration import integrate
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, scratch, table2
-from birthsim_env.physics import dynamics, options, spools
+from birthsim_env.physics import dynamics, options
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import INVERSE_SUPPLY, SOURCE, STATES, SUPPLY, V1, V2, Y1, Y2, Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.equilibrium import balance
-from birthsim_env.physics.geometry import end_effector_motion
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage.geometry import end_effector_motion
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 from birthsim_env.physics.options import FLOWS, FURTHER, SCRATCH, TUBES
+from birthsim_env.physics.pneumatics import spools
 
 
 class Clock(Numbers):

@@ -14,13 +14,13 @@ from birthsim_env.loop.loop import Loop, Place
 from birthsim_env.loop.rows import ACTION, OPENING, STATE, Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Part, Stage
-from birthsim_env.physics import tubes, valves
-from birthsim_env.physics.air import driving_flows, valve_of
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.pneumatics import tubes, valves
+from birthsim_env.physics.pneumatics.air import driving_flows, valve_of
 
 VALVE_LAYOUTS = ("two_valves", "one_valve")
 CHAMBERS = ("P1", "N1", "P2", "N2")

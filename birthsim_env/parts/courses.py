@@ -19,7 +19,7 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.times import Timed, check_times
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -7,14 +7,16 @@ they go from the right-hand side to the Runge-Kutta stage in registers.
 
 import math
 
-from birthsim_env.physics import air, friction, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK, WARP
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.compiled.shared import anew
 from birthsim_env.physics.compiled.stack import column, scratch
+from birthsim_env.physics.linkage import geometry, mechanics
+from birthsim_env.physics.pneumatics import air
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.seals import friction
 from birthsim_env.physics.step import STEP
 
 INTEGRATION_STEP = STEP.seconds

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from birthsim_env.physics.joint_sensors import EITHER_WAY, JointSensors
+from birthsim_env.physics.linkage.joint_sensors import EITHER_WAY, JointSensors
 from birthsim_env.physics.rig.declaration import Prior, parameter
 
 SLOWEST = 40.0

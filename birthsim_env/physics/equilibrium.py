@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 
-from birthsim_env.physics import dynamics, friction, geometry
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.linkage import geometry
+from birthsim_env.physics.seals import friction
 
 PASSES = 8
 """Of pressures by friction and friction by pressures, each of which leaves some 4 % of the error."""

@@ -16,13 +16,15 @@ option the state has further rows:
 
 import numpy as np
 
-from birthsim_env.physics import air, dynamics, maxwell_slip, tubes, valves
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.blocks import BLOCK
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.linkage.geometry import end_effector_motion
+from birthsim_env.physics.pneumatics import air, tubes, valves
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.seals import maxwell_slip
 
 RESERVOIR, HANDLE, TUBES, FLOWS, BRISTLES = 0, 1, 5, 9, 13
 """Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; of the tubes of chambers P1, N1, P2, N2 four

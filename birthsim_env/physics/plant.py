@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from birthsim_env.physics import dynamics, options, spools
+from birthsim_env.physics import dynamics, options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.pneumatics import spools
 from birthsim_env.physics.rig.arrays import floats_of, shape_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import checked_count, is_within, shown

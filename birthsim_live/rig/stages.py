@@ -3,10 +3,11 @@
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import block
-from birthsim_env.physics import air, dynamics, tubes
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.pneumatics import air, tubes
 
 INSIDE = 6
 """Rows of what goes on inside the cylinders: friction of the pistons and the air that flows into the chambers."""

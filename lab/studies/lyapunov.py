@@ -23,7 +23,7 @@ import numpy as np
 from baselines.backstepping.controller import BacksteppingController
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.linkage.geometry import jacobian
 from birthsim_env.physics.rig.parameters import Parameters
 
 PNEUMATIC_UNIT = 1e-5

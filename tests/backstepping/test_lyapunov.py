@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
 from tests.oracles import closed_loop

@@ -10,7 +10,7 @@ from baselines.bench.probes import POSES, StiffnessResult
 from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.linkage.geometry import inverse_geometry, joint_force
 from lab.studies.comparison import stiffness as studies
 from lab.studies.comparison import stiffness_figures as study_figures
 from lab.studies.comparison.stiffness import disturbance_study, ellipse_study, frictionless, polar_study, stiffness_study

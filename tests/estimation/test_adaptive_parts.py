@@ -12,8 +12,8 @@ from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
+from birthsim_env.physics.linkage import geometry, mechanics
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.derived_law import coulomb_levels
 

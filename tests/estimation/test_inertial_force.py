@@ -13,7 +13,7 @@ from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
-from birthsim_env.physics.geometry import end_effector, joint_force
+from birthsim_env.physics.linkage.geometry import end_effector, joint_force
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.derived_law import coulomb_levels
 

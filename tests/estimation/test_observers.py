@@ -8,7 +8,7 @@ import pytest
 from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.linkage.geometry import jacobian
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop

@@ -11,7 +11,7 @@ from birthsim_env.loop.signals import Measurement
 from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import end_effector, jacobian
+from birthsim_env.physics.linkage.geometry import end_effector, jacobian
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.estimation.test_observers import PERIOD, rms
 from tests.oracles.observed import Sampled

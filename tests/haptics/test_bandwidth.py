@@ -7,7 +7,7 @@ from baselines.impedance import declared_by, mass_spring_damper
 from baselines.valve_inverse import driving_flows
 from birthsim_env.physics.compiled.lanes import PN2, PP2, Rig, parameter_array, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.bandwidth.study import BANDS, felt_impedance, hand_lines, lines
 from lab.studies.bandwidth.valves import commanded_openings

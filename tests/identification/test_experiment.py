@@ -10,7 +10,7 @@ from baselines.identification import experiment
 from baselines.identification.experiment import TRAVEL, propose, read_plan
 from baselines.identification.laboratory import run_plan
 from baselines.named import make_controller
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.identification.trials import OWNER, TRUE, trial
 

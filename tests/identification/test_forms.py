@@ -19,7 +19,7 @@ from baselines.named import make_controller
 from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import parameter_column
-from birthsim_env.physics.geometry import end_effector, inverse_geometry
+from birthsim_env.physics.linkage.geometry import end_effector, inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import value_of
 from tests.identification.trials import OWNER, TRUE, trial

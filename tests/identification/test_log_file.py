@@ -16,7 +16,7 @@ from baselines.logs.log import Column, Log, Series
 from baselines.logs.table import read_table
 from baselines.logs.writing import write_log
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.tables.table import Reading
 from tests.identification.trials import OWNER, part, trial
 

@@ -7,7 +7,7 @@ from baselines.limiter import air_spring
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import InPlane, Joints
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.linkage.inverse_kinematics import pistons_at
 from lab.studies.haptics.worlds import resting
 from lab.studies.stability.rig_port import RigPort
 from tests.limiter.test_port_limiter import signals_of

@@ -12,7 +12,7 @@ from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.parts.sensors.lab import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry, jacobian
+from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import LINEAR

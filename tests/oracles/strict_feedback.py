@@ -7,12 +7,14 @@ pneumatic stiffness (9). Input U, (4, N): qA2, qT2, qA1, qT1, the active and pre
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics import control_model, friction, geometry, mechanics
+from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.compiled.records import Rows, row
+from birthsim_env.physics.linkage import geometry, mechanics
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.seals import friction
 
 
 class State(Rows):

@@ -11,7 +11,7 @@ from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.sensors.encoders import EncoderSensors
 from birthsim_env.parts.sensors.joint_board import ENCODER_PARAMETERS, GAUGE_PARAMETERS, JointErrors
 from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS
-from birthsim_env.physics.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.linkage.geometry import inverse_geometry, joint_force
 from birthsim_env.registry import entry
 
 CIRCLE, PROBE = "BirthSIM/Circle-v2", "BirthSIM/Probe-v3"

@@ -7,7 +7,7 @@ import pytest
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.physics.compiled.lanes import FC1, MASS
-from birthsim_env.physics.geometry import inverse_geometry, jacobian
+from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian
 from birthsim_env.physics.rig.parameters import DECLARED
 from birthsim_env.physics.strength import carried
 from tests.oracles import rigid_body

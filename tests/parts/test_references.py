@@ -12,7 +12,7 @@ from birthsim_env import Circle, FixedTarget, Parameters, Path, Trajectory
 from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import environment_id, find_scenario
-from birthsim_env.physics.geometry import end_effector
+from birthsim_env.physics.linkage.geometry import end_effector
 from birthsim_env.registry import names
 from tests.fuzz.rigs import odd_rig
 

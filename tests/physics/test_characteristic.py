@@ -5,10 +5,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from birthsim_env.physics.characteristic import Edge, common_opening, largest_part, opened_part, opening_of
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import parameter_array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.pneumatics.characteristic import Edge, common_opening, largest_part, opened_part, opening_of
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import LINEAR, MPYE_5_M5
 from tests.physics.rigs import UNLIKE

@@ -11,10 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from birthsim_env.physics import dynamics, friction
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y2, Z1, Z2
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.seals import friction
 from birthsim_env.physics.step import STEP
 from lab.studies.accuracy.second_model import plastic_fraction
 from tests.physics.rigs import LAWS, NO_FRICTION

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2
+from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Geometry, Parameters
 from tests.oracles import linkage_by_points as by_points

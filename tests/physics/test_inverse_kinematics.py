@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion, piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body

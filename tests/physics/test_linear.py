@@ -9,9 +9,9 @@ from scipy.linalg import expm
 
 from birthsim_env import Parameters, Plant, balanced_pressures, linearize, linearize_lanes
 from birthsim_env.gradients.linear.model import LinearModel
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.linkage import geometry
 from lab.studies.gradients.states import plant_of
 from tests.console import call, strict
 from tests.physics.rigs import OTHER, PRESSED

@@ -8,11 +8,11 @@ import pytest
 from birthsim_env.physics import dynamics, options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.driven_friction import friction_along
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.maxwell_slip import ELEMENTS, MOVING, REACH, STIFFNESS
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.seals.driven_friction import friction_along
+from birthsim_env.physics.seals.maxwell_slip import ELEMENTS, MOVING, REACH, STIFFNESS
 from lab.studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
 from lab.studies.accuracy.second_model import SecondModel
 from tests.physics.rigs import OTHER, PRESSED

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from birthsim_env.physics import dynamics, mechanics
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import PN1, PN2, PP1, PP2, V1, V2, Y1, Y2, Array
+from birthsim_env.physics.linkage import mechanics
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import linkage_by_points as by_points

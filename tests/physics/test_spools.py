@@ -4,9 +4,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from birthsim_env.physics import spools
 from birthsim_env.physics.compiled.lanes import PLAY, parameter_array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.pneumatics import spools
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.accuracy.motions import PERIOD, PERIODS, strong
 from tests.physics.test_second_model import start

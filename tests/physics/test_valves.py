@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env.physics import air, valves
-from birthsim_env.physics.characteristic import edge_of
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, TEMPERATURES, Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.pneumatics import air, valves
+from birthsim_env.physics.pneumatics.characteristic import edge_of
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import LINEAR, MPYE_5_M5, Curve
 from lab.studies.accuracy import second_model

@@ -9,7 +9,7 @@ from agents.residual.unexplained import MOVING
 from baselines.admittance.controller import AdmittanceController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop, rigid_body

@@ -18,8 +18,8 @@ from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import INTERMEDIATE, Seen
 from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import Stage
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived

@@ -22,15 +22,15 @@ def test_a_result_says_what_made_it_and_is_stale_by_the_definition_that_differs(
     assert changed(result, measuring) == []
     assert not {path for path in result["sources"] if path.startswith(("tests/", "agents/")) or path == "lab/engine/door.py"}
     result["sources"]["birthsim_env/physics/dynamics.py"]["advance"] = "0"
-    del result["sources"]["birthsim_env/physics/friction.py"]["coulomb_force"]
+    del result["sources"]["birthsim_env/physics/seals/friction.py"]["coulomb_force"]
     assert changed(result, measuring) == [
         "birthsim_env/physics/dynamics.py:advance",
-        "birthsim_env/physics/friction.py:coulomb_force",
+        "birthsim_env/physics/seals/friction.py:coulomb_force",
     ]
 
 
 def test_a_result_with_hashes_of_files_names_those_that_changed():
-    path = "birthsim_env/physics/friction.py"
+    path = "birthsim_env/physics/seals/friction.py"
     content = {"sources": {path: source(ROOT / path).code, "birthsim_env/gone.py": "0", "birthsim_env/reward.py": "0"}}
     assert changed(content, stiffest.STUDY.measuring) == ["birthsim_env/gone.py", "birthsim_env/reward.py"]
 

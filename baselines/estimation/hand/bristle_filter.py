@@ -10,10 +10,10 @@ creeps under its noise; here the model alone moves the bristles at rest.
 import math
 
 from baselines.estimation import dry_friction
-from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Rows, rows
+from birthsim_env.physics.seals import friction
 
 SPEED_NOISE = 1e-6
 """m2/s3: density of the noise that drives v; found by trial."""

@@ -15,11 +15,11 @@ from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.rows import POSITION, Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, part, row
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage import geometry
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 
 PUSH_NOISE = 3.0
 """N2/s: density of the noise that drives the push; found by trial. At rest it is then averaged over 0.2 s."""

@@ -4,9 +4,9 @@ from baselines.estimation import dry_friction
 from baselines.estimation.hand import bristle_filter
 from baselines.estimation.hand.bristle_filter import Bristled
 from birthsim_env.loop.signals import Joints, PerChamber
-from birthsim_env.physics import mechanics
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.physics.linkage import mechanics
 
 LATE = 0.002
 """s; found by trial: a moving head is off by so much times its speed, as ``identify`` leaves 0.5 to 1 ms of a latency."""

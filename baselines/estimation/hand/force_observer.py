@@ -13,10 +13,10 @@ import math
 from baselines.estimation import dry_friction
 from baselines.estimation.hand import force_bias
 from birthsim_env.loop.signals import Joints, PerPiston
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
+from birthsim_env.physics.linkage import geometry
 
 FRICTION_FRACTION = 0.9
 """a; assumed."""

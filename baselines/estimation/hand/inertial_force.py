@@ -21,10 +21,10 @@ from baselines.estimation.rows import AssumedParameters
 from birthsim_env.loop.rows import POSITION, Signals
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.linkage import geometry
+from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
 
 QUICKNESS = 500.0
 """1/s, of the low-pass on the force; found by trial. A slower one makes the head swing against a clamp."""

@@ -15,10 +15,12 @@ from birthsim_env.gradients.evaluated import evaluated
 from birthsim_env.gradients.graph import Graph, Scalar
 from birthsim_env.gradients.symbols import empty, inputs
 from birthsim_env.gradients.tracing import call
-from birthsim_env.physics import control_model, dynamics, mechanics, options, tubes
+from birthsim_env.physics import control_model, dynamics, options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.linkage import mechanics
+from birthsim_env.physics.linkage.geometry import end_effector_motion
+from birthsim_env.physics.pneumatics import tubes
 
 KINKED = (at.V1, at.V2, *at.SPOOLS)
 """States that may stand on a kink: dry friction and orifices."""

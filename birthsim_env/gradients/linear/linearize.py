@@ -22,16 +22,17 @@ from numpy.typing import ArrayLike
 from birthsim_env.gradients.linear.derivatives import derivatives_of
 from birthsim_env.gradients.linear.model import Jacobians, LinearModel, OperatingPoint, Signal
 from birthsim_env.gradients.tracing import call
-from birthsim_env.physics import geometry, options
+from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
 from birthsim_env.physics.dynamics import coulomb_level
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.maxwell_slip import ELEMENTS
-from birthsim_env.physics.mechanics import piston_force
+from birthsim_env.physics.linkage import geometry
+from birthsim_env.physics.linkage.mechanics import piston_force
 from birthsim_env.physics.plant import Plant, checked
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
+from birthsim_env.physics.seals.maxwell_slip import ELEMENTS
 
 _UNITS = {"y": "m", "v": "m/s", "z": "m", "P": "Pa", "T": "K", "s": "1"}
 STATES = tuple(Signal(name, _UNITS[name[0]]) for name in at.STATE_NAMES)

@@ -40,12 +40,12 @@ from birthsim_env.parts.sensors.readings import (
     show,
 )
 from birthsim_env.parts.sensors.sensor_errors import Errors
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.electronics import Electronics
+from birthsim_env.physics.linkage import geometry, mechanics
 from birthsim_env.registry import register
 
 

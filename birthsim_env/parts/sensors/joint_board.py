@@ -11,7 +11,7 @@ from birthsim_env.parts.sensors.sensor_errors import SENSOR_PARAMETERS, Shared
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, number, part, row, rows
 from birthsim_env.physics.electronics import Electronics
-from birthsim_env.physics.joint_sensors import JointSensors
+from birthsim_env.physics.linkage.joint_sensors import JointSensors
 
 _DRAWN = {name: one for name, one in JointSensors.parameters.items() if one.range}
 ENCODER_PARAMETERS = tuple(name for name in _DRAWN if name.startswith("encoder"))

@@ -15,7 +15,7 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.electronics import Electronics
-from birthsim_env.physics.joint_sensors import JointSensors
+from birthsim_env.physics.linkage.joint_sensors import JointSensors
 
 _DRAWN = {name: one for name, one in Electronics.parameters.items() if one.range and name not in JointSensors.parameters}
 SENSOR_PARAMETERS = tuple(_DRAWN)

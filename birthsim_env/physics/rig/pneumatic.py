@@ -8,7 +8,7 @@ import numpy as np
 from birthsim_env.physics.rig.declaration import Prior, Section, derived, parameter
 
 IN_CHAMBER = 0.75
-"""Part of a tube's air that counts to the chamber's; the rest is at the valve's end (``physics.tubes``)."""
+"""Part of a tube's air that counts to the chamber's; the rest is at the valve's end (``physics.pneumatics.tubes``)."""
 
 
 def _tube_volume(own: Any) -> Any:

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from birthsim_env.physics import valves
-from birthsim_env.physics.characteristic import edge_of
+from birthsim_env.physics.pneumatics import valves
+from birthsim_env.physics.pneumatics.characteristic import edge_of
 from birthsim_env.physics.rig.declaration import Derived, Prior, Section, derived, parameter
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from birthsim_env.physics.maxwell_slip import ELEMENTS, REACH, STIFFNESS
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.seals.maxwell_slip import ELEMENTS, REACH, STIFFNESS
 
 Array = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])

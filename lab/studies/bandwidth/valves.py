@@ -17,10 +17,10 @@ from baselines.impedance import Complex, Impedance
 from baselines.valve_inverse import CLEARANCE, air_at, driving_flows, stiffness_of, valve_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics import control_model
-from birthsim_env.physics.characteristic import common_opening
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.geometry import inverse_geometry, jacobian, joint_force
+from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian, joint_force
+from birthsim_env.physics.pneumatics.characteristic import common_opening
 from birthsim_env.physics.rig.parameters import Parameters
 
 CROSSING = 1e-3

@@ -25,10 +25,10 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.linkage.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.pneumatics.valves import driving_flow, laminar_slope
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number, shown
-from birthsim_env.physics.valves import driving_flow, laminar_slope
 
 GRID = 0.01
 """s between the instants at which the air is summed; a stroke takes hundreds of them."""

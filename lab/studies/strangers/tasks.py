@@ -17,7 +17,7 @@ from birthsim_env.loop.stage import Part
 from birthsim_env.parts.points import Through
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.linkage.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters, value_of
 from lab.studies.recovery.tasks import SENSORS, drawn_rig
 from lab.studies.strangers.model import Strangeness, Stranger

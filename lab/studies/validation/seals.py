@@ -8,9 +8,9 @@ from scipy.optimize import least_squares
 from scipy.signal import savgol_filter
 
 from baselines.work.tasks import Result
-from birthsim_env.physics import friction
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.seals import friction
 from birthsim_env.tables.reading import read_table
 
 FOLDER = "piston_friction"

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from baselines.work.tasks import Result
-from birthsim_env.physics import tubes, valves
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.pneumatics import tubes, valves
 from birthsim_env.physics.rig.parameters import Parameters
 
 FOLDER = "tubes"

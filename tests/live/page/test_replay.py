@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 
-from birthsim_env.physics.geometry import end_effector
+from birthsim_env.physics.linkage.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import FIELDS, SLICES, load_recording
 from tests.live.browser import Server, Window

@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from birthsim_env.physics.mechanics import piston_force
+from birthsim_env.physics.linkage.mechanics import piston_force
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.words import FIGURES, PAPER
 

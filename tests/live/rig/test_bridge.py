@@ -8,7 +8,7 @@ import pytest
 from birthsim_build.stages import LEAST_TIME, PACE
 from birthsim_env import Circle, FixedTarget, Parameters
 from birthsim_env.parts.scenarios import find_scenario
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.registry import names
 from tests.live.rig.course import Course
 

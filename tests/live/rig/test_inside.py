@@ -5,7 +5,7 @@ import pytest
 
 from birthsim_env import Parameters, Plant
 from birthsim_env.physics.compiled import lanes
-from birthsim_env.physics.geometry import amplification
+from birthsim_env.physics.linkage.geometry import amplification
 from birthsim_live.rig.stages import INSIDE, look_inside
 
 FRICTION = [getattr(lanes, name) for name in ("FC1", "FC2", "FP1", "FP2", "FV1", "FV2", "S0", "S1")]

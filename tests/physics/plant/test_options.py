@@ -8,9 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ranges
-from birthsim_env.physics import options, tubes
+from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.pneumatics import tubes
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 from lab.studies.accuracy import second_model
 from lab.studies.accuracy.motions import PERIOD, strong

@@ -15,10 +15,11 @@ it does, 1 or -1, and 0 while it sticks. It changes between integration steps al
 v has passed zero, and one that stuck holds no more than D_i; where it began to slip is found at its end (``caught``).
 """
 
-from birthsim_env.physics import dynamics, friction
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.seals import friction
 from birthsim_env.physics.step import STEP
 
 ELEMENTS = 4

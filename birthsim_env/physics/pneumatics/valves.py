@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from birthsim_env.physics.characteristic import Edge, common_opening, opened_part, opening_of
 from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.pneumatics.characteristic import Edge, common_opening, opened_part, opening_of
 
 LINEAR_RATIO = 0.99
 """Pressure ratio above which the flow falls linearly to zero, as ISO 6358-1:2013 does in the laminar range; without it the

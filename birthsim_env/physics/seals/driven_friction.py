@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics import dynamics, maxwell_slip
+from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
@@ -14,6 +14,7 @@ from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.physics.runge_kutta import STAGES, ahead_of, weight_of
+from birthsim_env.physics.seals import maxwell_slip
 
 ROWS = at.STATES + maxwell_slip.ROWS
 """Of a state with the elements of ``maxwell_slip``."""
@@ -89,7 +90,7 @@ def friction_along(
     A seal that pressure presses on, at 10 mm/s with 1 bar and with 7 bar in one chamber:
 
     >>> import numpy as np
-    >>> from birthsim_env.physics.driven_friction import friction_along
+    >>> from birthsim_env.physics.seals.driven_friction import friction_along
     >>> rig = Parameters().replace({"cylinder2.coulomb_friction": 3.0, "cylinder2.pressure_friction": 5e-6})
     >>> times, air = np.linspace(0, 1, 101), rig.air.atmospheric_pressure
     >>> pressures = np.stack([np.where(times < 0.5, 1e5, 7e5), np.zeros(101)]) + air

@@ -3,12 +3,12 @@
 State rows are those of ``lanes.STATE_NAMES``: P1, N1, P2, N2 in this order, of each its pressure and its temperature.
 """
 
-from birthsim_env.physics import chambers, valves
-from birthsim_env.physics.characteristic import Edge
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.stack import column
+from birthsim_env.physics.pneumatics import chambers, valves
+from birthsim_env.physics.pneumatics.characteristic import Edge
 
 
 @helper

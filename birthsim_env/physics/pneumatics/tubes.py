@@ -20,10 +20,10 @@ would follow within 0.1 ms, and an explicit step could not. ``docs/plant_options
 
 import math
 
-from birthsim_env.physics import air, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.pneumatics import air, valves
 from birthsim_env.physics.rig.pneumatic import IN_CHAMBER
 from birthsim_env.physics.step import STEP
 

@@ -8,9 +8,9 @@ and r4^2 = d3^2 + d6^2 + 2 d3 d6 sin(gamma3 - theta1) gives r4 in the same way.
 
 import math
 
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.linkage import geometry
 
 
 @helper

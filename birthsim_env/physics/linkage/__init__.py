@@ -1,0 +1,1 @@
+"""Where the pistons hold the end effector, and what moves with it."""

@@ -1,0 +1,1 @@
+"""Air of chambers, tubes and valves."""
