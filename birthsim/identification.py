@@ -9,8 +9,8 @@ from tqdm import tqdm
 
 from baselines.identification.identified import Identified
 from baselines.identification.identified import identify as identify_trial
-from baselines.identification.log_columns import LogOptions
-from baselines.identification.log_file import read_trial
+from baselines.identification.log.log_columns import LogOptions
+from baselines.identification.log.log_file import read_trial
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import path_of, shown
 
@@ -69,7 +69,7 @@ def identify(
     >>> import birthsim, pathlib, tempfile
     >>> from baselines.identification.experiment import propose
     >>> from baselines.identification.laboratory import run_plan
-    >>> from baselines.identification.log_file import write_trial
+    >>> from baselines.identification.log.log_file import write_trial
     >>> known = birthsim.Parameters()
     >>> true = known.replace({"mechanics.mass": 3.6})
     >>> law = birthsim.make_controller("backstepping")

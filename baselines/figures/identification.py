@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from baselines.figures.style import COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, look, save
 from baselines.identification.identified import Identified
-from baselines.identification.log_columns import CHAMBERS
+from baselines.identification.log.log_columns import CHAMBERS
 from birthsim_env.physics.compiled.lanes import Array
 
 LAGS = 40

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from baselines.identification.certainty import DETERMINED, NORMAL, Certainty, certainty_of
-from baselines.identification.estimate import Fit, Tick, fit, refine
-from baselines.identification.force_offset import ForceOffset, force_offset
-from baselines.identification.forms import Suspect, shown, suspects
-from baselines.identification.free_parameters import FreeParameter, free_of, shown_by, with_more
-from baselines.identification.log_columns import CHAMBERS
-from baselines.identification.noise import LEAST, guessed_noise, noise_of
-from baselines.identification.starts import Noise
-from baselines.identification.trial import Trial
+from baselines.identification.fit.certainty import DETERMINED, NORMAL, Certainty, certainty_of
+from baselines.identification.fit.estimate import Fit, Tick, fit, refine
+from baselines.identification.fit.forms import Suspect, shown, suspects
+from baselines.identification.fit.free_parameters import FreeParameter, free_of, shown_by, with_more
+from baselines.identification.log.log_columns import CHAMBERS
+from baselines.identification.log.trial import Trial
+from baselines.identification.windows.force_offset import ForceOffset, force_offset
+from baselines.identification.windows.noise import LEAST, guessed_noise, noise_of
+from baselines.identification.windows.starts import Noise
 from birthsim_env.files import write_text
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.compiled.lanes import Array

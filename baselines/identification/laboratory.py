@@ -8,7 +8,7 @@ import numpy as np
 from baselines.bench.resting import RestingRigs
 from baselines.controller import Controller
 from baselines.identification.experiment import PNEUMATIC, Plan
-from baselines.identification.trial import Trial
+from baselines.identification.log.trial import Trial
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.loop.stage import Part
 from birthsim_env.parts.points import Through

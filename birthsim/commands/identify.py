@@ -10,11 +10,11 @@ from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.identification.experiment import DURATION, propose, read_plan
-from baselines.identification.free_parameters import unmeasured
+from baselines.identification.fit.free_parameters import unmeasured
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.log_columns import LogOptions
-from baselines.identification.log_file import read_trial, write_trial
+from baselines.identification.log.log_columns import LogOptions
+from baselines.identification.log.log_file import read_trial, write_trial
 from baselines.identification.valve_table import fit_valve_table
 from baselines.logs.writing import WRITERS
 from baselines.named import make_controller

@@ -7,14 +7,14 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.identification.estimate import Problem, search
 from baselines.identification.experiment import propose
-from baselines.identification.free_parameters import FREE_PARAMETERS
+from baselines.identification.fit.estimate import Problem, search
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS
 from baselines.identification.laboratory import run_plan
-from baselines.identification.noise import guessed_noise
-from baselines.identification.rows import checked_trial
-from baselines.identification.trial import Trial
-from baselines.identification.windows import cut
+from baselines.identification.log.rows import checked_trial
+from baselines.identification.log.trial import Trial
+from baselines.identification.windows.noise import guessed_noise
+from baselines.identification.windows.windows import cut
 from baselines.named import make_controller
 from birthsim_env import Parameters
 from tests.fuzz.strategies import NUMBERS, composite, sampled

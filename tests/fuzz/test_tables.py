@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 from scipy.io import savemat
 
-from baselines.identification.log_columns import COLUMNS, LogOptions, read_columns
+from baselines.identification.log.log_columns import COLUMNS, LogOptions, read_columns
 from birthsim_env import Parameters
 from birthsim_env.parts.courses import check_points
 from birthsim_env.parts.own_parts import hand_of, trajectory_of

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from baselines.identification.trial import Trial
+from baselines.identification.log.trial import Trial
 from birthsim_env.physics.compiled.lanes import Array
 from tests.identification.trials import part, trial
 

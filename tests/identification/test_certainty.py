@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from baselines.identification.certainty import NORMAL, certainty_of
-from baselines.identification.estimate import Fit
-from baselines.identification.free_parameters import FREE_PARAMETERS
-from baselines.identification.starts import Noise
+from baselines.identification.fit.certainty import NORMAL, certainty_of
+from baselines.identification.fit.estimate import Fit
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS
+from baselines.identification.windows.starts import Noise
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.identification import estimate, starts
-from baselines.identification.certainty import certainty_of
-from baselines.identification.estimate import Problem, fit, refine, search
 from baselines.identification.experiment import propose
-from baselines.identification.free_parameters import (
+from baselines.identification.fit import estimate
+from baselines.identification.fit.certainty import certainty_of
+from baselines.identification.fit.estimate import Problem, fit, refine, search
+from baselines.identification.fit.free_parameters import (
     FREE_PARAMETERS,
     INSIDE,
     LATENCY,
@@ -21,10 +21,10 @@ from baselines.identification.free_parameters import (
 )
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.noise import guessed_noise
-from baselines.identification.starts import Noise
-from baselines.identification.trial import Trial
-from baselines.identification.windows import cut
+from baselines.identification.log.trial import Trial
+from baselines.identification.windows.noise import guessed_noise
+from baselines.identification.windows.starts import Noise
+from baselines.identification.windows.windows import cut, starts
 from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
 from birthsim_env.physics.rig.servovalves import MPYE_5_M5, Curve

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.identification.encoders import slopes_of, zeros_by_tracker
 from baselines.identification.experiment import ASKED, PNEUMATIC, SOFT, STIFF, propose, read_plan
-from baselines.identification.free_parameters import FREE_PARAMETERS, coordinates, free_of, rig_at, shown_by
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS, coordinates, free_of, rig_at, shown_by
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.log_columns import PISTONS, POSITIONS
-from baselines.identification.log_file import read_trial, write_trial
-from baselines.identification.prediction import predict
-from baselines.identification.trial import ENCODERS, TRACKER
-from baselines.identification.windows import ENDS, SUPPLY, admitted_openings, cut, spools_at
+from baselines.identification.log.log_columns import PISTONS, POSITIONS
+from baselines.identification.log.log_file import read_trial, write_trial
+from baselines.identification.log.trial import ENCODERS, TRACKER
+from baselines.identification.windows.encoders import slopes_of, zeros_by_tracker
+from baselines.identification.windows.prediction import predict
+from baselines.identification.windows.windows import ENDS, SUPPLY, admitted_openings, cut, spools_at
 from baselines.named import make_controller
 from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at

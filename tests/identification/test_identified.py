@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from baselines.identification.force_offset import ForceOffset
 from baselines.identification.identified import Identified, Row
-from baselines.identification.starts import Noise
+from baselines.identification.windows.force_offset import ForceOffset
+from baselines.identification.windows.starts import Noise
 from birthsim_env.physics.rig.parameters import Parameters
 
 NOISE = Noise(500.0, 1e-4)

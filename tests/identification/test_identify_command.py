@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.identification import budget
+from baselines.identification.fit import budget
 from baselines.identification.identified import REMEMBER
 from baselines.identification.identified import identify as identify_trial
-from baselines.identification.log_file import write_trial
-from baselines.identification.trial import Trial
+from baselines.identification.log.log_file import write_trial
+from baselines.identification.log.trial import Trial
 from birthsim.commands import identify
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 from tests.console import call
@@ -39,7 +39,7 @@ def test_experiment_and_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cap
 def test_a_log_that_is_read_by_options_and_what_is_said_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from baselines.identification.log_file import write_trial
+    from baselines.identification.log.log_file import write_trial
 
     def read(found: Trial, *_: object, **__: object) -> None:
         trials.append(found)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.identification.log_columns import COLUMNS, LogOptions, read_columns
+from baselines.identification.log.log_columns import COLUMNS, LogOptions, read_columns
 from birthsim_env.physics.compiled.lanes import Array
 from tests.tables.test_packed_files import mcap
 

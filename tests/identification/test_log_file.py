@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.identification.log_columns import PISTONS, LogOptions
-from baselines.identification.log_file import COLUMNS, FORCES, read_trial, write_trial
+from baselines.identification.log.log_columns import PISTONS, LogOptions
+from baselines.identification.log.log_file import COLUMNS, FORCES, read_trial, write_trial
 from baselines.logs.log import Column, Log, Series
 from baselines.logs.table import read_table
 from baselines.logs.writing import write_log

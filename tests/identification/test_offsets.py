@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from baselines.identification.estimate import Problem
-from baselines.identification.free_parameters import FREE_PARAMETERS, coordinates
-from baselines.identification.noise import guessed_noise
-from baselines.identification.windows import cut
+from baselines.identification.fit.estimate import Problem
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS, coordinates
+from baselines.identification.windows.noise import guessed_noise
+from baselines.identification.windows.windows import cut
 from tests.identification.trials import TRUE, part, trial
 
 BIAS = np.array([1500.0, -900.0, 600.0, -1800.0])

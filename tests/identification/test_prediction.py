@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from baselines.identification.prediction import predict
-from baselines.identification.trial import Trial, fresh_rows
-from baselines.identification.windows import Windows, cut, spools_at
+from baselines.identification.log.trial import Trial, fresh_rows
+from baselines.identification.windows.prediction import predict
+from baselines.identification.windows.windows import Windows, cut, spools_at
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant

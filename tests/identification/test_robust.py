@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from baselines.identification import estimate, starts
-from baselines.identification.budget import Budget
-from baselines.identification.estimate import Fit, Problem, search
-from baselines.identification.force_offset import force_offset
-from baselines.identification.free_parameters import FREE_PARAMETERS, coordinates
-from baselines.identification.noise import guessed_noise
-from baselines.identification.trial import Trial
-from baselines.identification.windows import cut
+from baselines.identification.fit import estimate
+from baselines.identification.fit.budget import Budget
+from baselines.identification.fit.estimate import Fit, Problem, search
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS, coordinates
+from baselines.identification.log.trial import Trial
+from baselines.identification.windows.force_offset import force_offset
+from baselines.identification.windows.noise import guessed_noise
+from baselines.identification.windows.windows import cut, starts
 from birthsim_env.physics.rig.parameters import value_of
 from tests.identification.broken import scattered
 from tests.identification.trials import OWNER, TRUE, part, trial

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from baselines.identification.rows import checked_trial
-from baselines.identification.trial import Trial
+from baselines.identification.log.rows import checked_trial
+from baselines.identification.log.trial import Trial
 from tests.identification.broken import (
     ALL,
     ROWS,

@@ -6,7 +6,7 @@ import numpy as np
 
 from baselines.identification.experiment import propose
 from baselines.identification.laboratory import run_plan
-from baselines.identification.trial import Trial
+from baselines.identification.log.trial import Trial
 from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.statistics import quantile
-from baselines.identification.free_parameters import FREE_PARAMETERS, LATENCY
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS, LATENCY
 from baselines.work.tasks import Task
 from birthsim_env.parts.drawn.randomization import Ranges
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.identification.estimate import Fit
-from baselines.identification.free_parameters import FreeParameter, coordinates, rig_at
-from baselines.identification.one_step import one_step
-from baselines.identification.starts import predicted
-from baselines.identification.windows import Windows
+from baselines.identification.fit.estimate import Fit
+from baselines.identification.fit.free_parameters import FreeParameter, coordinates, rig_at
+from baselines.identification.fit.one_step import one_step
+from baselines.identification.windows.starts import predicted
+from baselines.identification.windows.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from baselines.identification.trial import fresh_rows, numbers, runs
+from baselines.identification.log.trial import fresh_rows, numbers, runs
 from birthsim_env.physics.compiled.lanes import Array
 
 Mask = NDArray[np.bool_]

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.identification.encoders import zeros_by_tracker
-from baselines.identification.log_columns import (
+from baselines.identification.log.log_columns import (
     COLUMNS,
     COUNTED_COLUMNS,
     FORCES,
@@ -16,8 +15,9 @@ from baselines.identification.log_columns import (
     LogOptions,
     read_columns,
 )
-from baselines.identification.rows import checked_trial
-from baselines.identification.trial import Trial
+from baselines.identification.log.rows import checked_trial
+from baselines.identification.log.trial import Trial
+from baselines.identification.windows.encoders import zeros_by_tracker
 from baselines.logs.log import Log, Series
 from baselines.logs.writing import WRITERS, write_log
 from birthsim_env.files import write_text

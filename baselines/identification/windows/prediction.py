@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.identification.tracks import begin_options, track, track_options
-from baselines.identification.windows import Windows, admitted_openings, spools_at
+from baselines.identification.windows.tracks import begin_options, track, track_options
+from baselines.identification.windows.windows import Windows, admitted_openings, spools_at
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import polynomial
 
-from baselines.identification.encoders import POWERS, REACH, WIDER, slopes_of
-from baselines.identification.starts import Noise, Slopes
-from baselines.identification.windows import Windows
+from baselines.identification.windows.encoders import POWERS, REACH, WIDER, slopes_of
+from baselines.identification.windows.starts import Noise, Slopes
+from baselines.identification.windows.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.identification.estimate import Fit
+from baselines.identification.fit.estimate import Fit
 from birthsim_env.physics.compiled.lanes import Array
 
 DETERMINED = 0.5

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baselines.identification.starts import predicted, slopes_at
-from baselines.identification.windows import Windows
+from baselines.identification.windows.starts import predicted, slopes_at
+from baselines.identification.windows.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 
 if TYPE_CHECKING:
-    from baselines.identification.estimate import Problem
+    from baselines.identification.fit.estimate import Problem
 
 SHORT, SOME = 0.1, 24
 """s and number of the windows of the first search, assumed."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from baselines.identification.starts import Noise, Slopes
-from baselines.identification.trial import Trial, fresh_rows
-from baselines.identification.windows import Windows
+from baselines.identification.log.trial import Trial, fresh_rows
+from baselines.identification.windows.starts import Noise, Slopes
+from baselines.identification.windows.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 
 LEAST = Noise(1.0, 1e-7)

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from baselines.identification.noise import GAUSS
-from baselines.identification.windows import Windows
+from baselines.identification.windows.noise import GAUSS
+from baselines.identification.windows.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 
 LIMIT = 6.0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.identification.trial import ENCODERS, TRACKER
+from baselines.identification.log.trial import ENCODERS, TRACKER
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.consistency import least_dead_volume, settling_volume
 from birthsim_env.physics.rig.declaration import Prior

@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from baselines.identification.faults import STILL as STANDING
-from baselines.identification.faults import clipped, held, jumps, pinned, samples_of, spikes, standing, strayed
-from baselines.identification.log_columns import OPENINGS, POSITIONS, PRESSURES
-from baselines.identification.noise import noise_of
-from baselines.identification.signals import Signal
-from baselines.identification.timing import Grid, even_grid
-from baselines.identification.trial import Trial, bridged, fresh_rows, long_runs, numbers, runs
-from baselines.identification.units import (
+from baselines.identification.log.faults import STILL as STANDING
+from baselines.identification.log.faults import clipped, held, jumps, pinned, samples_of, spikes, standing, strayed
+from baselines.identification.log.log_columns import OPENINGS, POSITIONS, PRESSURES
+from baselines.identification.log.signals import Signal
+from baselines.identification.log.timing import Grid, even_grid
+from baselines.identification.log.trial import Trial, bridged, fresh_rows, long_runs, numbers, runs
+from baselines.identification.log.units import (
     OVER,
     check_exchanged,
     check_moving,
@@ -24,6 +23,7 @@ from baselines.identification.units import (
     check_pressures,
     inside,
 )
+from baselines.identification.windows.noise import noise_of
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linkage.geometry import workspace
 from birthsim_env.physics.rig.parameters import Parameters

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.identification.certainty import score_products
-from baselines.identification.estimate import Fit
+from baselines.identification.fit.certainty import score_products
+from baselines.identification.fit.estimate import Fit
 from birthsim_env.physics.compiled.lanes import Array
 
 

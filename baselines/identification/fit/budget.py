@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from baselines.identification.trial import Trial
+from baselines.identification.log.trial import Trial
 
 TIMES, AT_LEAST = 7_000.0, 35_000.0
 """How often the duration of a log is predicted at most, and s that are predicted at most of a short one; good logs take some

@@ -6,10 +6,10 @@ Each check guesses from what most rows hold, so that a few odd ones neither hide
 import numpy as np
 from scipy.signal import lfilter
 
-from baselines.identification.faults import Mask
-from baselines.identification.log_columns import CHAMBERS
-from baselines.identification.timing import MOST
-from baselines.identification.trial import runs
+from baselines.identification.log.faults import Mask
+from baselines.identification.log.log_columns import CHAMBERS
+from baselines.identification.log.timing import MOST
+from baselines.identification.log.trial import runs
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.linkage.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters

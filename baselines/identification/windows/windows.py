@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter, savgol_filter
 
-from baselines.identification.budget import Budget
-from baselines.identification.tracks import admit_rows
-from baselines.identification.trial import Trial, bridged, fresh_rows, numbers
+from baselines.identification.fit.budget import Budget
+from baselines.identification.log.trial import Trial, bridged, fresh_rows, numbers
+from baselines.identification.windows.tracks import admit_rows
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.dynamics import coulomb_levels, steps_in

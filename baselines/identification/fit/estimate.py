@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from baselines.identification.beginnings import SHORT, best_drawn, spread_out
-from baselines.identification.budget import UnsettledError
-from baselines.identification.free_parameters import FREE_PARAMETERS, FreeParameter, coordinates, limits, rig_at
-from baselines.identification.noise import guessed_noise, is_fitting, noise_from
-from baselines.identification.offsets import Offsets
-from baselines.identification.robust import reweighted
-from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
-from baselines.identification.trial import Trial
-from baselines.identification.windows import Windows, cut
+from baselines.identification.fit.beginnings import SHORT, best_drawn, spread_out
+from baselines.identification.fit.budget import UnsettledError
+from baselines.identification.fit.free_parameters import FREE_PARAMETERS, FreeParameter, coordinates, limits, rig_at
+from baselines.identification.fit.robust import reweighted
+from baselines.identification.log.trial import Trial
+from baselines.identification.windows.noise import guessed_noise, is_fitting, noise_from
+from baselines.identification.windows.offsets import Offsets
+from baselines.identification.windows.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
+from baselines.identification.windows.windows import Windows, cut
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.identification.prediction import predict
-from baselines.identification.windows import BRISTLES, FREE, Windows, coulomb_levels_of
+from baselines.identification.windows.prediction import predict
+from baselines.identification.windows.windows import BRISTLES, FREE, Windows, coulomb_levels_of
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from baselines.identification.estimate import Fit
-from baselines.identification.one_step import one_step
-from baselines.identification.starts import predicted
+from baselines.identification.fit.estimate import Fit
+from baselines.identification.fit.one_step import one_step
+from baselines.identification.windows.starts import predicted
 from birthsim_env.physics.compiled.lanes import Array
 
 STEP = 0.1

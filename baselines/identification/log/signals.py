@@ -5,9 +5,9 @@ from typing import NoReturn
 
 import numpy as np
 
-from baselines.identification.faults import Mask
-from baselines.identification.timing import MOST, NAMED, Grid
-from baselines.identification.trial import bridged, numbers, runs
+from baselines.identification.log.faults import Mask
+from baselines.identification.log.timing import MOST, NAMED, Grid
+from baselines.identification.log.trial import bridged, numbers, runs
 from birthsim_env.physics.compiled.lanes import Array
 
 

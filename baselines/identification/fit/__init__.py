@@ -1,0 +1,1 @@
+"""Parameters under which predictions differ least from a log."""

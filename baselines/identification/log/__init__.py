@@ -1,0 +1,1 @@
+"""A log of a laboratory: its columns, its rows, and what is wrong with them."""
