@@ -141,12 +141,12 @@ class LinearQuadratic(TrackingController):
 
     LAW, CONSTANTS = staticmethod(control), Constants
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "integral_tolerance": (1e-6, 1e-3, 1.755e-05, 2.693e-05),
-        "position_tolerance": (3e-4, 1e-1, 0.002635, 0.001237),
-        "speed_tolerance": (1e-2, 3.0, 1.657, 0.03281),
-        "force_tolerance": (1.0, 100.0, 2.705, 2.002),
-        "friction_fraction": (0.0, 1.0, 0.4927, 0.6965),
-        "dead_zone": (0.0, 5e-4, 4.097e-06, 0.0001098),
+        "integral_tolerance": (1e-6, 1e-3, 1.496e-05, 2.01e-05),
+        "position_tolerance": (3e-4, 1e-1, 0.01156, 0.002392),
+        "speed_tolerance": (1e-2, 3.0, 0.5829, 1.152),
+        "force_tolerance": (1.0, 100.0, 2.826, 1.959),
+        "friction_fraction": (0.0, 1.0, 0.3522, 0.7203),
+        "dead_zone": (0.0, 5e-4, 3.35e-05, 0.0001414),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, Any]:

@@ -108,12 +108,12 @@ class PositionPID(TrackingController):
 
     LAW, CONSTANTS = staticmethod(control), Constants
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "bandwidth": (15.0, 100.0, 55.86, 47.97),
-        "damping": (0.1, 2.0, 0.6967, 0.3754),
-        "integral_rate": (0.5, 30.0, 17.8, 3.121),
-        "pressure_gain": (40.0, 400.0, 296.1, 398.8),
-        "friction_fraction": (0.0, 1.0, 0.1946, 0.5481),
-        "dead_zone": (0.0, 5e-4, 2.051e-05, 2.38e-05),
+        "bandwidth": (15.0, 100.0, 69.12, 40.47),
+        "damping": (0.1, 2.0, 0.3865, 0.6882),
+        "integral_rate": (0.5, 30.0, 16.48, 12.19),
+        "pressure_gain": (40.0, 400.0, 337.7, 328.3),
+        "friction_fraction": (0.0, 1.0, 0.4213, 0.6659),
+        "dead_zone": (0.0, 5e-4, 7.36e-05, 7.683e-05),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:

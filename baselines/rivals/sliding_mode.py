@@ -91,11 +91,11 @@ class SlidingMode(TrackingController):
 
     LAW, CONSTANTS = staticmethod(control), Constants
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "surface_rate": (10.0, 100.0, 33.33, 23.96),
-        "reaching_rate": (100.0, 10000.0, 8965.0, 4340.0),
-        "layer_rate": (10.0, 200.0, 141.0, 198.3),
-        "friction_fraction": (0.0, 1.0, 0.1183, 0.9448),
-        "dead_zone": (0.0, 5e-4, 5.316e-05, 4.506e-05),
+        "surface_rate": (10.0, 100.0, 33.97, 24.36),
+        "reaching_rate": (100.0, 10000.0, 1920.0, 4990.0),
+        "layer_rate": (10.0, 200.0, 117.1, 194.0),
+        "friction_fraction": (0.0, 1.0, 0.2342, 0.9921),
+        "dead_zone": (0.0, 5e-4, 2.405e-05, 5.875e-05),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
