@@ -88,9 +88,11 @@ def test_rows_by_number_are_found():
 GIVEN = {
     "baselines/estimation/hand/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)},
     "baselines/estimation/dry_friction.py": {"pressures[2 * cylinder, i]", "pressures[2 * cylinder + 1, i]"},
+    "baselines/identification/windows/tracks.py": {"known[0, i]", "known[1 + k, i]", "flows[4 + k, i]"},
     "lab/studies/bandwidth/valves.py": {"pressures[2 * k, 0]", "pressures[2 * k + 1, 0]"},
 }
-"""Arguments that are one named group of whoever calls: x and y, or chambers P1, N1, P2, N2."""
+"""Arguments that are one named group of whoever calls: x and y, or chambers P1, N1, P2, N2. In tracks.py: the supply's
+pressure and then those of the tubes' ends; flows from the supply and then those to the atmosphere, (8, N)."""
 
 
 def test_kernels_name_their_rows():
