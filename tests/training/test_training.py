@@ -31,17 +31,18 @@ PROBE = "BirthSIM/ProbeResidual-v3"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(
     PROBE,
-    steps=30_000,
+    steps=45_000,
     lanes=32,
     rollout=32,
     batch=256,
     epochs=4,
     hidden=(32, 32),
-    learning_rate=2e-3,
+    learning_rate=1e-3,
     validation_lanes=8,
     validations=2,
 )
-"""On 4.5 s of the stiffness test, a few seconds are enough to take a third off the law's error."""
+"""On 4.5 s of the stiffness test, some seconds are enough to take a third off the law's error. With the overlap of valves two
+seeds of three were worse than the law after 15,000 steps at a rate of 2e-3."""
 BRIEF = replace(SMALL, steps=2048, lanes=16, validation_lanes=4, validations=2)
 
 
@@ -57,7 +58,7 @@ def trained(tmp_path_factory):
 def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
     _, reached = trained
     law, policy, curve = reached["law"], reached["policy"], reached["curve"]
-    # Seeds 0 to 2 reached 0.63 to 0.76 of the law's error, and 0.52 to 0.70 of its tail.
+    # Seeds 0 to 2 reached 0.40 to 0.72 of the law's error, and 0.29 to 0.63 of its tail.
     assert policy["pooled_mm"] < 0.85 * law["pooled_mm"]
     assert policy["tail_mm"] < 0.85 * law["tail_mm"]
     assert policy["lost"] == law["lost"] == 0
@@ -65,7 +66,7 @@ def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
     assert steady([{name: best[name] for name in policy}]) == steady([policy])
     # Validations at the start, at equal intervals (the nearest ends of rollouts), and at the end.
     rollouts = 32 * 32
-    assert [point["steps"] for point in curve] == [0, *(rollouts * np.ceil(np.array([15e3, 30e3]) / rollouts)).astype(int)]
+    assert [point["steps"] for point in curve] == [0, *(rollouts * np.ceil(np.array([22.5e3, 45e3]) / rollouts)).astype(int)]
     assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(curve))
     assert all(0 < point["environment_fraction"] < 1 for point in curve[1:])
     assert reached["settings"] == {**SMALL.to_dict(), **RESIDUAL.to_dict(), "rig": Parameters().to_dict()}
