@@ -36,6 +36,6 @@ def _mark(cells: list[list[str]], column: int, rows: list[int], most: bool) -> N
             cells[row][column] = re.sub(r"^\S*[^\s,;]", r"**\g<0>**", cells[row][column])
 
 
-def cells(values: Sequence[float | str]) -> str:
+def cells(values: Sequence[float | str], between: str = ", ") -> str:
     """Figures of a result, in which a lost one is a word, side by side."""
-    return ", ".join(value if isinstance(value, str) else number(value) for value in values)
+    return between.join(value if isinstance(value, str) else number(value) for value in values)

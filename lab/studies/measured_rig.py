@@ -7,12 +7,13 @@ throughout, so that nothing but the rig differs.
 """
 
 import dataclasses
+import itertools
 from typing import Any
 
 import numpy as np
 
 from baselines.bench.evaluation import evaluate
-from baselines.bench.statistics import number, penalize_lost
+from baselines.bench.statistics import jsonable, penalize_lost, quantile
 from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
@@ -20,7 +21,7 @@ from birthsim_env.physics.rig.servovalves import LINEAR
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import cells, markdown
 from lab.engine.worlds import SEED, worlds
 
 LEVELS = {"cylinder1.coulomb_friction": 12.0, "cylinder2.coulomb_friction": 15.0}
@@ -38,6 +39,9 @@ ASSUMED: dict[str, dict[str, tuple[float, float, float]]] = {
 
 EXCHANGED: dict[str, tuple[str, ...]] = {"assumed": (), **{part: (part,) for part in ASSUMED}, "measured": tuple(ASSUMED)}
 """Names of the rigs, and which parts have what was measured."""
+
+WHOLE = ("assumed", "measured")
+"""The rigs of all controllers' table."""
 
 WORDS = {"assumed": "nothing", "measured": "all"}
 """Names of the rigs in tables, where they are no parts."""
@@ -60,7 +64,7 @@ def rig_of(exchanged: tuple[str, ...]) -> Parameters:
 def measure(rig: str, controller: str, sensors: str, episodes: int, seed: int) -> Result:
     """``COLUMNS`` of a controller that believes a rig of ``EXCHANGED``; a lost head is infinitely bad."""
     nominal = rig_of(EXCHANGED[rig])
-    found: dict[str, list[float]] = {}
+    found: dict[str, Any] = {}
     for environment in dict.fromkeys(one for one, _, _ in COLUMNS.values()):
         law = make_controller(controller, nominal)
         setting: Any = {"parameters": nominal, "sensors": sensors, "randomize": True}
@@ -68,8 +72,9 @@ def measure(rig: str, controller: str, sensors: str, episodes: int, seed: int) -
         for name, (own, metrics, _) in COLUMNS.items():
             if own == environment:
                 largest = np.max([np.abs(result.metrics[metric]) for metric in metrics], axis=0)
-                found[name] = np.quantile(penalize_lost(largest, result.lost), [0.5, 0.95]).tolist()
-    return dict(found)
+                values = penalize_lost(largest, result.lost)
+                found[name] = [quantile(values, 0.5), quantile(values, 0.95)]
+    return {name: jsonable(row) for name, row in found.items()}
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -92,13 +97,24 @@ def _kept(_: Options, found: Found) -> Any:
     ]
 
 
+def _figures(row: dict[str, Any]) -> list[str]:
+    return [cells(row[name], " / ") for name in COLUMNS]
+
+
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "sensors", "what was measured", *(head for _, _, head in COLUMNS.values())]]
-    for row in content["figures"]:
-        cells = [" / ".join(map(number, row[name])) for name in COLUMNS]
-        rows.append([f"`{row['controller']}`", row["sensors"], WORDS.get(row["rig"], row["rig"]), *cells])
     said = f"{worlds(content['settings']['seed'], content['settings']['episodes'])}; median / 95th percentile."
-    return {"measured-rig.md": f"{said}\n\n{markdown(rows)}\n"}
+    heads = [head for _, _, head in COLUMNS.values()]
+    both = [["controller", "sensors", *(f"{head}: {rig}" for head in heads for rig in WHOLE)]]
+    found = {(row["controller"], row["sensors"], row["rig"]): row for row in content["figures"]}
+    for controller, sensors in dict.fromkeys(key[:2] for key in found):
+        before, after = (_figures(found[controller, sensors, rig]) for rig in WHOLE)
+        both.append([f"`{controller}`", sensors, *itertools.chain(*zip(before, after, strict=True))])
+    parts = [["sensors", "what was measured", *heads]]
+    for (controller, sensors, rig), row in found.items():
+        if controller == content["settings"]["controller"][-1]:
+            parts.append([sensors, WORDS.get(rig, rig), *_figures(row)])
+    alone = f"Part by part, `{content['settings']['controller'][-1]}`:"
+    return {"measured-rig.md": f"{said}\n\n{markdown(both)}\n\n{alone}\n\n{markdown(parts)}\n"}
 
 
 STUDY = Study(

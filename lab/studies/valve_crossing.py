@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from baselines.bench.evaluation import evaluate
-from baselines.bench.statistics import number, penalize_lost
+from baselines.bench.statistics import jsonable, penalize_lost, quantile
 from baselines.figures.style import ACCENT, DARK, LINES, PAGE, STYLE, headline, legend_below, save
 from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
@@ -22,7 +22,7 @@ from birthsim_env.physics.rig.servovalves import LINEAR, MPYE_5_M5, Curve
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import cells, markdown
 from lab.engine.worlds import SEED, worlds
 
 CHOSEN = 920_000
@@ -41,7 +41,7 @@ COLUMNS = {
 def measure(controller: str, sensors: str, curve: list[float], crossing: float, episodes: int, seed: int) -> Result:
     """``COLUMNS`` of a controller whose rig has a valve ``curve``, which it knows; a lost head is infinitely bad."""
     rig = Parameters().replace({**Curve(*curve).changes(), "valves.crossing": crossing})
-    found: dict[str, list[float]] = {}
+    found: dict[str, Any] = {}
     for environment in dict.fromkeys(one for one, _, _ in COLUMNS.values()):
         law = make_controller(controller, rig)
         setting: Any = {"parameters": rig, "sensors": sensors, "randomize": True}
@@ -49,8 +49,8 @@ def measure(controller: str, sensors: str, curve: list[float], crossing: float, 
         for name, (own, metric, _) in COLUMNS.items():
             if own == environment:
                 values = penalize_lost(np.abs(result.metrics[metric]), result.lost)
-                found[name] = np.quantile(values, [0.5, 0.95]).tolist()
-    return dict(found)
+                found[name] = [quantile(values, 0.5), quantile(values, 0.95)]
+    return {name: jsonable(row) for name, row in found.items()}
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -82,8 +82,8 @@ def _shown(content: Content) -> dict[str, str]:
     rows = [["controller", "sensors", "crossing", *(head for _, _, head in COLUMNS.values())]]
     for row in content["figures"]:
         if row["worlds"] == "judged":
-            cells = [" / ".join(map(number, row[name])) for name in COLUMNS]
-            rows.append([f"`{row['controller']}`", row["sensors"], _crossing(row["crossing"]), *cells])
+            figures = [cells(row[name], " / ") for name in COLUMNS]
+            rows.append([f"`{row['controller']}`", row["sensors"], _crossing(row["crossing"]), *figures])
     count = content["settings"]["episodes"]
     chosen = f"The crossing was chosen on {worlds(CHOSEN, count)}, which the picture has too."
     said = f"{worlds(content['settings']['seed'], count)}. {chosen}"

@@ -33,12 +33,13 @@ def test_a_part_alone_differs_from_the_default_rig_in_the_other_parts(part):
     assert {name for name in known if drawn[name] != known[name]} == others & set(known)
 
 
-def test_the_table_has_a_row_for_every_rig():
+def test_the_tables_have_both_rigs_and_every_part():
     tasks = measured_rig.STUDY.tasks(OPTIONS)
     assert [rig for rig, _, _ in tasks] == list(EXCHANGED)
     figures = measured_rig.STUDY.keep(OPTIONS, {key: {name: [1.5, 2.5] for name in measured_rig.COLUMNS} for key in tasks})
     text = measured_rig.STUDY.show({"figures": figures, "settings": vars(OPTIONS)})["measured-rig.md"]
-    assert text.count("1.5 / 2.5 | 1.5 / 2.5 | 1.5 / 2.5 |") == len(EXCHANGED)
+    assert f"| `admittance-adaptive` | ideal |{6 * ' 1.5 / 2.5 |'}\n" in text, "assumed and measured, of three metrics"
+    assert [line.split(" | ")[1] for line in text.splitlines() if line.startswith("| ideal")] == ["nothing", *ASSUMED, "all"]
 
 
 def test_controllers_believe_the_rig_of_their_row():
