@@ -22,12 +22,13 @@ from baselines.identification.fit.free_parameters import (
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log.trial import Trial
+from baselines.identification.windows import starts
 from baselines.identification.windows.noise import guessed_noise
 from baselines.identification.windows.starts import Noise
-from baselines.identification.windows.windows import cut, starts
+from baselines.identification.windows.windows import cut
 from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
-from birthsim_env.physics.rig.servovalves import MPYE_5_M5, Curve
+from birthsim_env.physics.rig.servovalves import MPYE_5_M5
 from tests.identification.trials import OWNER, TRUE, part, trial
 
 SOME = tuple(
@@ -61,11 +62,15 @@ def problem(noise: Noise | None = None) -> Problem:
 
 
 def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """J'r against central differences of the cost, whose start states and offsets are sought anew at every place."""
+    """J'r against central differences of the cost, whose start states and offsets are sought anew at every place.
+
+    The place is near the rig of the log: where residuals are some times the noise start states do not settle (with linear
+    valves 5 to 24 standard deviations are left), and such a cost has jumps. The latency is between two rows: straight
+    lines between positions have a corner at each.
+    """
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
     monkeypatch.setattr(estimate, "STILL", 1e-5)
-    # Not where an overlap is none: there are no differences to both sides.
-    asked, theta = problem(), coordinates(TRUE.replace(Curve(5e-4, 0.0).changes()), FREE_PARAMETERS)
+    asked, theta = problem(), coordinates(TRUE.replace({LATENCY: 0.0063}), FREE_PARAMETERS)
     asked.jacobian(theta)  # whose slopes are those of where the start states end
     asked.residuals(theta + 1e-9)
     gradient = asked.jacobian(theta).T @ asked.residuals(theta)
@@ -74,8 +79,8 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
         step = 1e-3 / max(size[k], 1.0)
         sides = [0.5 * np.sum(asked.residuals(theta + sign * step * np.eye(len(theta))[k]) ** 2) for sign in (1.0, -1.0)]
         central = (sides[0] - sides[1]) / (2 * step)
-        # In standard deviations of this coordinate: a hundredth of one is lost in the interval.
-        assert abs(gradient[k] - central) / size[k] < 0.05, FREE_PARAMETERS[k].name
+        # In standard deviations of this coordinate; differences leave up to 2e-4.
+        assert abs(gradient[k] - central) / size[k] < 1e-3, FREE_PARAMETERS[k].name
 
 
 @pytest.mark.parametrize("one", FREE_PARAMETERS, ids=lambda one: one.name)

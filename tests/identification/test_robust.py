@@ -12,9 +12,10 @@ from baselines.identification.fit.budget import Budget
 from baselines.identification.fit.estimate import Fit, Problem, search
 from baselines.identification.fit.free_parameters import FREE_PARAMETERS, coordinates
 from baselines.identification.log.trial import Trial
+from baselines.identification.windows import starts
 from baselines.identification.windows.force_offset import force_offset
 from baselines.identification.windows.noise import guessed_noise
-from baselines.identification.windows.windows import cut, starts
+from baselines.identification.windows.windows import cut
 from birthsim_env.physics.rig.parameters import value_of
 from tests.identification.broken import scattered
 from tests.identification.trials import OWNER, TRUE, part, trial
