@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from baselines.identification.experiment import propose
-from baselines.identification.fit import estimate
+from baselines.identification.fit import problem as problems
 from baselines.identification.fit.certainty import certainty_of
-from baselines.identification.fit.estimate import Problem, fit, refine, search
+from baselines.identification.fit.estimate import fit, refine, search
 from baselines.identification.fit.free_parameters import (
     FREE_PARAMETERS,
     INSIDE,
@@ -19,6 +19,7 @@ from baselines.identification.fit.free_parameters import (
     limits,
     rig_at,
 )
+from baselines.identification.fit.problem import Problem
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log.trial import Trial
@@ -69,7 +70,7 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
     lines between positions have a corner at each.
     """
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
-    monkeypatch.setattr(estimate, "STILL", 1e-5)
+    monkeypatch.setattr(problems, "STILL", 1e-5)
     asked, theta = problem(), coordinates(TRUE.replace({LATENCY: 0.0063}), FREE_PARAMETERS)
     asked.jacobian(theta)  # whose slopes are those of where the start states end
     asked.residuals(theta + 1e-9)
