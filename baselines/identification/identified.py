@@ -8,9 +8,10 @@ import numpy as np
 import tomli_w
 
 from baselines.identification.fit.certainty import DETERMINED, NORMAL, Certainty, certainty_of
-from baselines.identification.fit.estimate import Fit, Tick, fit, refine
+from baselines.identification.fit.estimate import Fit, fit, refine
 from baselines.identification.fit.forms import Suspect, shown, suspects
 from baselines.identification.fit.free_parameters import FreeParameter, free_of, shown_by, with_more
+from baselines.identification.fit.problem import Tick
 from baselines.identification.log.log_columns import CHAMBERS
 from baselines.identification.log.trial import Trial
 from baselines.identification.windows.force_offset import ForceOffset, force_offset
@@ -243,9 +244,9 @@ def identify(
     zeros = whole.problem.offsets.encoders(whole.jacobian[: -len(free)], whole.covariance)
     before = np.empty(0) if trial.counted is None else trial.counted
     found = tuple(one for one, known in zip(free, certainty.determined, strict=True) if known)
-    over = whole.problem.windows.budget.over
-    whole = replace(whole, ended=whole.ended and not over)
-    last = whole if over or len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
+    budget = whole.problem.windows.budget
+    last = whole if budget.over or len(found) == len(free) or not found else refine(trial, whole, owner, found, tick)
+    last = replace(last, ended=last.ended and not budget.over)
     rig = last.rig if found else owner
     rows = []
     for one, theta, deviation, known in zip(free, whole.theta, certainty.deviation, certainty.determined, strict=True):

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.identification.experiment import propose
-from baselines.identification.fit.estimate import Problem, search
+from baselines.identification.fit.estimate import search
 from baselines.identification.fit.free_parameters import FREE_PARAMETERS
+from baselines.identification.fit.problem import Problem
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log.rows import checked_trial
 from baselines.identification.log.trial import Trial

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from baselines.identification.experiment import propose
-from baselines.identification.fit import estimate
+from baselines.identification.fit import problem as problems
 from baselines.identification.fit.certainty import certainty_of
-from baselines.identification.fit.estimate import Problem, fit, refine, search
+from baselines.identification.fit.estimate import fit, refine, search
 from baselines.identification.fit.free_parameters import (
     FREE_PARAMETERS,
     INSIDE,
@@ -19,15 +19,17 @@ from baselines.identification.fit.free_parameters import (
     limits,
     rig_at,
 )
+from baselines.identification.fit.problem import Problem
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log.trial import Trial
+from baselines.identification.windows import starts
 from baselines.identification.windows.noise import guessed_noise
 from baselines.identification.windows.starts import Noise
-from baselines.identification.windows.windows import cut, starts
+from baselines.identification.windows.windows import cut
 from baselines.named import make_controller
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
-from birthsim_env.physics.rig.servovalves import MPYE_5_M5, Curve
+from birthsim_env.physics.rig.servovalves import LINEAR, MPYE_5_M5
 from tests.identification.trials import OWNER, TRUE, part, trial
 
 SOME = tuple(
@@ -61,11 +63,15 @@ def problem(noise: Noise | None = None) -> Problem:
 
 
 def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """J'r against central differences of the cost, whose start states and offsets are sought anew at every place."""
+    """J'r against central differences of the cost, whose start states and offsets are sought anew at every place.
+
+    The place is near the rig of the log: where residuals are some times the noise start states do not settle (with linear
+    valves 5 to 24 standard deviations are left), and such a cost has jumps. The latency is between two rows: straight
+    lines between positions have a corner at each.
+    """
     monkeypatch.setattr(starts, "CLOSE", 1e-5)
-    monkeypatch.setattr(estimate, "STILL", 1e-5)
-    # Not where an overlap is none: there are no differences to both sides.
-    asked, theta = problem(), coordinates(TRUE.replace(Curve(5e-4, 0.0).changes()), FREE_PARAMETERS)
+    monkeypatch.setattr(problems, "STILL", 1e-5)
+    asked, theta = problem(), coordinates(TRUE.replace({LATENCY: 0.0063}), FREE_PARAMETERS)
     asked.jacobian(theta)  # whose slopes are those of where the start states end
     asked.residuals(theta + 1e-9)
     gradient = asked.jacobian(theta).T @ asked.residuals(theta)
@@ -74,8 +80,8 @@ def test_the_gradient_is_that_of_the_cost(monkeypatch: pytest.MonkeyPatch) -> No
         step = 1e-3 / max(size[k], 1.0)
         sides = [0.5 * np.sum(asked.residuals(theta + sign * step * np.eye(len(theta))[k]) ** 2) for sign in (1.0, -1.0)]
         central = (sides[0] - sides[1]) / (2 * step)
-        # In standard deviations of this coordinate: a hundredth of one is lost in the interval.
-        assert abs(gradient[k] - central) / size[k] < 0.05, FREE_PARAMETERS[k].name
+        # In standard deviations of this coordinate; differences leave up to 2e-4.
+        assert abs(gradient[k] - central) / size[k] < 1e-3, FREE_PARAMETERS[k].name
 
 
 @pytest.mark.parametrize("one", FREE_PARAMETERS, ids=lambda one: one.name)
@@ -180,15 +186,19 @@ def test_fewer_parameters_are_fitted_anew_from_a_fit() -> None:
     assert (np.abs(first.theta - coordinates(TRUE, mass)) < 4 * deviation).all()
 
 
+BELIEVED = OWNER.replace(LINEAR.changes())
+"""A rig whose owner takes its valves for linear."""
+
+
 def log_of(**more: float) -> Trial:
     """5 s of the proposed experiment on a rig with the catalogue's valves, under a law that believes in linear ones."""
-    rig = TRUE.replace({**MPYE_5_M5.changes(), **{name.replace("__", "."): value for name, value in more.items()}})
-    return run_plan(propose(OWNER, 5.0, 0), [rig], make_controller("backstepping", OWNER), "lab", 5)[0]
+    rig = TRUE.replace({name.replace("__", "."): value for name, value in more.items()})
+    return run_plan(propose(OWNER, 5.0, 0), [rig], make_controller("backstepping", BELIEVED), "lab", 5)[0]
 
 
 @pytest.mark.slow
 def test_the_curve_of_the_valves_is_found_from_five_seconds() -> None:
-    found = identify(log_of(), OWNER, 0)
+    found = identify(log_of(), BELIEVED, 0)
     rows = {row.name: row for row in found.rows}
     for name, true in MPYE_5_M5.changes().items():
         assert rows[name].determined

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from baselines.identification.fit.estimate import Problem
 from baselines.identification.fit.free_parameters import FREE_PARAMETERS, coordinates
+from baselines.identification.fit.problem import Problem
 from baselines.identification.windows.noise import guessed_noise
 from baselines.identification.windows.windows import cut
 from tests.identification.trials import TRUE, part, trial

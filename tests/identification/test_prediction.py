@@ -114,5 +114,5 @@ def test_derivatives_are_those_of_another_integrator() -> None:
         start[list(at.SPOOLS)] = spools_before(windows.trial, windows.starts, OWNER)[:, 0]
         sides = [integrated(windows, OWNER.replace({name: value + sign * step}), start, windows.length) for sign in (1.0, -1.0)]
         theirs = (sides[0] - sides[1]) / (2 * step) * value
-        # Runge-Kutta steps of 0.25 ms follow spools and bristles to some 1e-4; the difference is of the first order, 1e-5.
+        # Steps of a third of 1 ms follow spools and bristles to some 1e-4; the difference is of the first order, 1e-5.
         assert np.abs(ours - theirs).max() < 2e-3 * np.abs(theirs).max()

@@ -1,6 +1,7 @@
 """Searches on logs that no check of rows has cleaned: missing measurements, outliers, forces that were not logged, no end."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 from functools import cache
 
@@ -8,13 +9,15 @@ import numpy as np
 import pytest
 
 from baselines.identification.fit import estimate
-from baselines.identification.fit.budget import Budget
-from baselines.identification.fit.estimate import Fit, Problem, search
+from baselines.identification.fit.budget import Budget, UnsettledError
+from baselines.identification.fit.estimate import Fit, search
 from baselines.identification.fit.free_parameters import FREE_PARAMETERS, coordinates
+from baselines.identification.fit.problem import Problem
 from baselines.identification.log.trial import Trial
+from baselines.identification.windows import starts
 from baselines.identification.windows.force_offset import force_offset
 from baselines.identification.windows.noise import guessed_noise
-from baselines.identification.windows.windows import cut, starts
+from baselines.identification.windows.windows import cut
 from birthsim_env.physics.rig.parameters import value_of
 from tests.identification.broken import scattered
 from tests.identification.trials import OWNER, TRUE, part, trial
@@ -109,6 +112,48 @@ def test_a_search_without_end_names_where_the_log_does_not_fit() -> None:
     asked = problem(spoiled(), Budget(4.0))
     with pytest.raises(ValueError, match=r"the log and the model of the rig disagree.* s; allowed: columns"):
         search(asked, coordinates(KNOWN, SOME), 20)
+
+
+def lost_in(monkeypatch: pytest.MonkeyPatch, *lost: int, spent: bool = False) -> None:
+    """Searches of which those with the numbers ``lost`` find nothing, and have ``spent`` all of the budget."""
+    numbers = itertools.count()
+
+    def change(problem: Problem, theta: np.ndarray, most: int) -> Fit:
+        if (number := next(numbers)) not in lost:
+            return search(problem, theta, most)
+        problem.windows.budget.left -= 1e9 if spent else 0.0
+        raise ValueError(f"search {number} finds nothing")
+
+    monkeypatch.setattr(estimate, "search", change)
+
+
+def test_a_beginning_that_loses_its_way_leaves_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    lost_in(monkeypatch, 0)
+    assert np.abs(estimate.fit(spoiled(), KNOWN, 0, SOME).theta - coordinates(TRUE, SOME)).max() < 0.02
+    lost_in(monkeypatch, 0, 1)
+    with pytest.raises(ValueError, match="search 0 finds nothing"):
+        estimate.fit(spoiled(), KNOWN, 0, SOME)
+
+
+def test_where_the_budget_ends_the_fit_before_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    lost_in(monkeypatch, 1, spent=True)
+    kept = estimate.fit(spoiled(), KNOWN, 0, SOME)
+    assert kept.problem.windows.budget.over
+    assert np.abs(kept.theta - coordinates(TRUE, SOME)).max() < 0.02
+    lost_in(monkeypatch, 1)
+    with pytest.raises(ValueError, match="search 1 finds nothing"):
+        estimate.fit(spoiled(), KNOWN, 0, SOME)
+
+
+def test_a_part_of_a_budget_leaves_the_rest() -> None:
+    budget = Budget(100.0)
+    with budget.part(0.4):
+        budget.spend(30.0)
+    assert budget.left == 70.0
+    with pytest.raises(UnsettledError), budget.part(0.5):
+        budget.spend(36.0)
+    assert 34.0 <= budget.left < 35.0
+    budget.spend(34.0)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])

@@ -57,7 +57,7 @@ LEFT_OUT: dict[str, tuple[Change, str, dict[str, int]]] = {
     "lost tracker": (stuck("positions", 1500, 1700), "position stands still while the head moves", {"positions": 404}),
     "lost cell": (stuck("pressures", 1500, 1700, 1), "pressures_N1 stands still in 200 rows", {"pressures": 200}),
     "elsewhere": (shifted("positions", 2000, 2100, 0.03), "position .*rows 2000 to 2099.*motion", {"positions": 200}),
-    "saturated": (capped("positions", 0.95), "position stays at the end of its range", {}),
+    "saturated": (capped("positions", 0.93), "position stays at the end of its range", {}),
     "missing rows": (
         without([500, 501, 1700]),
         "3 rows are missing: 2 after row 499 .*, 1 after row 1697",

@@ -9,7 +9,7 @@ from baselines.identification.windows.windows import Windows
 from birthsim_env.physics.compiled.lanes import Array
 
 if TYPE_CHECKING:
-    from baselines.identification.fit.estimate import Problem
+    from baselines.identification.fit.problem import Problem
 
 SHORT, SOME = 0.1, 24
 """s and number of the windows of the first search, assumed."""

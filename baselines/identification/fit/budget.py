@@ -1,5 +1,7 @@
 """An end for every identification, whatever its log says: a budget of what is predicted."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from baselines.identification.log.trial import Trial
@@ -20,6 +22,16 @@ class Budget:
     def of(trial: Trial) -> "Budget":
         """The budget of a trial."""
         return Budget(max(TIMES * float(trial.times[-1] - trial.times[0]), AT_LEAST))
+
+    @contextmanager
+    def part(self, share: float) -> Iterator[None]:
+        """Keep all but a ``share`` of what is left for what comes later, also where that share is used up."""
+        kept = (1.0 - share) * self.left
+        self.left -= kept
+        try:
+            yield
+        finally:
+            self.left, self.over = self.left + kept, False
 
     def spend(self, seconds: float) -> None:
         """Take ``seconds``; ``UnsettledError`` where that is more than what is left."""
