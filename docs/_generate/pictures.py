@@ -9,6 +9,7 @@ import birthsim_env
 from baselines import make_controller
 from baselines.driving import NO_ACTION, driving
 from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.physics.compiled.sources import files_of
 from birthsim_env.registry import names
 
 SECONDS, EVERY = 8, 80
@@ -17,7 +18,7 @@ SECONDS, EVERY = 8, 80
 
 def pictures(folder: Path) -> None:
     """Write ``circle.webp`` and so on into a folder; one that is newer than the package's code is kept."""
-    code = max(path.stat().st_mtime for path in Path(birthsim_env.__file__).parent.rglob("*.py"))
+    code = max(path.stat().st_mtime for path in files_of("birthsim_env"))
     for scenario in names("scenario"):
         file = folder / f"{scenario}.webp"
         if not file.exists() or file.stat().st_mtime < code:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from birthsim.command_line.start import perform
+from birthsim_env.physics.compiled.sources import ROOT, files_of
 from birthsim_env.physics.rig.values import near, shown
 
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -39,7 +40,7 @@ OWN = {
 def studies() -> dict[str, Listed]:
     """Every study by name, sorted."""
     found = dict[str, Listed]()
-    for path in STUDIES.rglob("*.py"):
+    for path in files_of(STUDIES.relative_to(ROOT).as_posix()):
         if b"register(study=" in (content := path.read_bytes()):
             module = ".".join(path.relative_to(STUDIES).with_suffix("").parts)
             found |= dict(_registered(ast.parse(content), module))
