@@ -2,7 +2,7 @@
 
 The laws cancel the rig's dynamics but not the valves' lag tau nor what sensors are late. Both make the fast poles that a stiff
 setpoint asks for unstable, and saturated valves then keep up a swing of 100 mm and more. Over masses of 1.5 to 6 kg, valves of
-2 to 8 ms and latencies of 0, 4 and 12 ms the laws rest up to 12.8 to 34 1/s times m/(tau + latency/4), N/m, which
+2 to 8 ms and latencies of 0, 4 and 12 ms the laws rest up to 13.3 to 39.6 1/s times m/(tau + latency/4), N/m, which
 ``birthsim study stiffest`` measures. ``RATE`` is below all of them.
 """
 
