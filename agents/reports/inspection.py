@@ -31,11 +31,8 @@ from birthsim_env.physics.rig.parameters import Parameters
 FRICTIONLESS = {f"cylinder{i}.{name}": 0.0 for i in (1, 2) for name in ("coulomb_friction", "pressure_friction")}
 """Changes of a rig that take its dry friction away."""
 
-PLACES, MASSES = 128, (2.0, 5.0)
-"""Places in the workspace at which the correction is looked at, and the range of the mass there, kg."""
-
-RUBBED, FRICTIONS = 32, (6.0, 25.0)
-"""Rigs that go round a circle, and the range of their Coulomb friction, N."""
+PLACES, RUBBED = 128, 32
+"""Places in the workspace at which the correction is looked at, and rigs that go round a circle."""
 
 ROUND = 4.0
 """s, that a circle takes."""
@@ -88,10 +85,17 @@ def _follow(
     return env, {name: np.array(steps) for name, steps in taken.items()}
 
 
+def _drawn(*names: str) -> dict[str, tuple[float, float]]:
+    """The ranges from which training draws these parameters."""
+    ranges = documented_ranges(Parameters())
+    return {name: ranges[name] for name in names}
+
+
 def weight_over_workspace(policy: Policy) -> tuple[Array, Array]:
     """Correction on cylinder 2 and m g cos(theta1), N, (PLACES,) each: held still, without friction, masses drawn at random."""
     hold, rig = FixedTarget(((0.40, 0.60), (-0.12, 0.08))), Parameters().replace(FRICTIONLESS)
-    env, taken = _follow(policy.network.acting(), policy.settings, PLACES, 3.0, hold, {"mechanics.mass": MASSES}, rig)
+    ranges = _drawn("mechanics.mass")
+    env, taken = _follow(policy.network.acting(), policy.settings, PLACES, 3.0, hold, ranges, rig)
     mass = env.simulation.plant.lane_parameters[at.MASS]
     angle = theta1(taken["piston_position"][-1, :, 0], rig)
     return taken["correction"][-100:, :, 1].mean(axis=0), mass * rig.mechanics.gravity * np.cos(angle)
@@ -105,7 +109,7 @@ def friction_along_circle(policy: Policy) -> tuple[Array, Array]:
     round the weight along cylinder 2 goes with its speed, and the other way against it. Frictions are drawn at random.
     """
     rig, halves = Parameters(), np.zeros((2, RUBBED))
-    ranges = {f"cylinder{i}.coulomb_friction": FRICTIONS for i in (1, 2)}
+    ranges = _drawn("cylinder1.coulomb_friction", "cylinder2.coulomb_friction")
     for period in (ROUND, -ROUND):
         env, taken = _follow(policy.network.acting(), policy.settings, RUBBED, 12.0, Circle(period=period), ranges, rig)
         speed, correction = (np.moveaxis(taken[name][400:], 2, 0) for name in ("piston_velocity", "correction"))

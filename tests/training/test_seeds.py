@@ -179,11 +179,12 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkey
     )
     policy = read_policy(best_policy("circle"))
     assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
+    beyond = (Parameters().friction.static_ratio - 1) * 12  # N, on cylinder 1 at mid pressures
     for unknown, half in zip(*friction_along_circle(policy), strict=True):
-        # Newton for newton, and nothing where the law knows its friction.
+        # Newton for newton. Where the law knows Coulomb's friction, what is left is what a slow piston has beyond it.
         slope, rest = np.polyfit(unknown, half, 1)
         assert 0.7 < slope < 1.3
-        assert abs(rest) < 2
+        assert -2 < rest < beyond
 
 
 @pytest.mark.slow
