@@ -122,17 +122,17 @@ def test_batches_hold_every_episode_once_and_never_four(count):
 def test_what_readme_and_paper_say_of_the_circle_holds():
     """They round; this fails when a renewed result leaves what the words mean."""
     found = {
-        (cell["controller"], cell["sensors"], cell["plant"]): cell["metrics"]["settled_rms"]["median"]
+        (cell["controller"], cell["sensors"], cell["plant"]): cell["metrics"]["settled_rms"]
         for cell in comparison.cells_of(read_result("circle"))
     }
-    lab = {name: error for (name, sensors, _), error in found.items() if sensors == "lab"}
+    lab = {name: error["median"] for (name, sensors, _), error in found.items() if sensors == "lab"}
     published, told, weighed = (lab[name] for name in ("backstepping", f"{TOLD}backstepping", f"{TOLD}backstepping-weight"))
     assert 3.5 < published < 4.5
     assert told < published / 2
     assert 0.15 < weighed / published < 0.25
     assert weighed < 1.0
-    assert lab["admittance-adaptive"] < 0.3
+    assert lab["admittance-adaptive"] < 0.35
     assert lab["residual:circle_lab"] < 0.4
     for (name, sensors, plant), error in found.items():
         if name.startswith("residual:") and not name.endswith("student"):
-            assert error > found["admittance-adaptive", sensors, plant]
+            assert error["high"] > found["admittance-adaptive", sensors, plant]["low"]
