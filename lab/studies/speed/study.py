@@ -19,6 +19,7 @@ from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.runge_kutta import STAGES
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
@@ -54,10 +55,11 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 def packed_fraction() -> tuple[int, int]:
     """Divisions and square roots of doubles in the integrator's machine code: (packed, scalar) instructions; x86 only."""
-    # Machine code from the cache cannot be inspected, so the integrator is compiled once more.
+    # Machine code that the package carries, or from the cache, cannot be inspected: the integrator is compiled once more.
     advance: Any = dynamics.advance
+    array, samples = numba.float64[:, ::1], numba.float64[:, :, ::1]
     compiled = numba.njit(error_model="numpy", nogil=True)(advance.py_func)
-    compiled.compile(advance.numba.signatures[0])
+    compiled.compile((array, array, samples, array, numba.int64, numba.float64, array))
     code = "\n".join(compiled.inspect_asm().values())
     return len(re.findall(r"\bv?(?:div|sqrt)pd\b", code)), len(re.findall(r"\bv?(?:div|sqrt)sd\b", code))
 
@@ -172,7 +174,7 @@ def here(seconds: float) -> Result:
     ours, theirs = _frames("BirthSIM/Circle-v2", budget), _frames("CartPole-v1", budget)
     rows: list[Row] = [
         ("plant, 1024 lanes", kernel, "policy steps/s (10 ms = 30 Runge-Kutta steps)"),
-        ("per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
+        ("per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / STAGES, "ns"),
         ("plant, 1 lane", lane, "policy steps/s"),
         ("ratio: a lane among 1024 to a lane alone", kernel / lane, "times"),
         (
