@@ -33,7 +33,7 @@ def gap(step: float, collide: bool, rig: Parameters = RIG) -> float:
 
 
 @pytest.mark.parametrize("collide", [False, True], ids=["clear of the stops", "through the stops"])
-def test_the_books_close_with_the_fourth_order_of_the_step(collide: bool) -> None:
+def test_the_books_close_at_least_with_the_order_of_the_step(collide: bool) -> None:
     coarse, fine = (gap(factor * KEEPING, collide) for factor in ((1, 0.5) if collide else (2, 1)))
     assert fine < 1e-7
     assert coarse > 8 * fine
