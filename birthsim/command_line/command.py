@@ -5,6 +5,7 @@ import re
 import signal
 import sys
 import textwrap
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -18,6 +19,9 @@ from birthsim.command_line.settings import CONTROLLER, ENV, HAND, SENSORS, TABLE
 from birthsim.command_line.start import endings
 
 S = TypeVar("S")
+
+AGAIN = 0.01
+"""Seconds after which a signal comes again that Python could not answer where it came."""
 
 
 class Ended(KeyboardInterrupt):
@@ -131,7 +135,19 @@ def act(name: str, action: Callable[[], None]) -> None:
             os._exit(128 + number)
         raise Ended(number)
 
+    def lost(where: Any) -> None:
+        if not isinstance(where.exc_value, Ended):
+            report(where)
+            return
+        # It came in a destructor or a callback of the interpreter's, which no exception leaves: it comes again after that.
+        came.clear()
+        again.append(threading.Timer(AGAIN, _send, [where.exc_value.number]))
+        again[-1].daemon = True
+        again[-1].start()
+
+    again: list[threading.Timer] = []
     before = {number: signal.signal(number, end) for number in words}
+    report, sys.unraisablehook = sys.unraisablehook, lost
     try:
         with warnings.catch_warnings():
             warnings.showwarning = partial(_warn, name, warnings.showwarning)
@@ -146,10 +162,21 @@ def act(name: str, action: Callable[[], None]) -> None:
             os._exit(128 + came[0])
         _say(name, _problem(error), 2)
     finally:
+        for timer in again:
+            timer.cancel()
         # After a signal the process ends, and another one ends it at once.
         if not came:
+            sys.unraisablehook = report
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def _send(number: int) -> None:
+    """A signal for the main thread, also where that waits for something."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
 
 
 def _warn(name: str, before: Callable[..., None], message: Warning | str, category: type[Warning], *where: Any) -> None:

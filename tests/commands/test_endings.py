@@ -42,6 +42,29 @@ def swallow():
 act("birthsim-x", swallow)
 """
 
+UNRAISABLE = """
+import signal, time
+from birthsim.command_line.command import act
+class Dying:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+def die():
+    Dying()
+    time.sleep(600)
+act("birthsim-x", die)
+"""
+
+UNRAISABLE_AT_THE_END = """
+import signal
+from birthsim.command_line.command import act
+class Dying:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+before = signal.getsignal(signal.SIGTERM)
+act("birthsim-x", lambda: Dying() and None)
+assert signal.getsignal(signal.SIGTERM) is before
+"""
+
 READING = """
 import signal, sys
 from dataclasses import dataclass
@@ -110,10 +133,19 @@ def test_a_folder_has_one_process_at_a_time(line, folder, tmp_path, monkeypatch,
     assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {".lock"}
 
 
-@pytest.mark.parametrize("program", [SWALLOWED, READING], ids=["swallowed", "while options are read"])
+PLACES = {"swallowed": SWALLOWED, "while options are read": READING, "in a destructor": UNRAISABLE}
+
+
+@pytest.mark.parametrize("program", PLACES.values(), ids=PLACES)
 def test_a_signal_is_a_signal_wherever_it_comes(program):
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (143, "birthsim-x: terminated\n")
+
+
+def test_a_signal_that_comes_too_late_changes_nothing():
+    """It comes in a destructor, and what the command does is complete before it can come again, or it counts."""
+    done = subprocess.run([sys.executable, "-c", UNRAISABLE_AT_THE_END], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) in [(0, ""), (143, "birthsim-x: terminated\n")]
 
 
 def test_signals_wait_while_results_replace_others(tmp_path, monkeypatch):
