@@ -1,4 +1,4 @@
-"""Super-twisting: its gains against Moreno's condition, its sampled term and its reaching phase against the differential equation."""
+"""Super-twisting: its gains against Moreno's condition, its sampled term, and how it reaches its surface."""
 
 import numpy as np
 import pytest
