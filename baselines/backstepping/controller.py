@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from baselines.backstepping import integral
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.backstepping.impedance import paper_impedance
@@ -33,6 +34,9 @@ PNEUMATIC_GAIN = 30.0
 
 SIGN_WIDTH = 0.002
 """m/s; assumed: over this speed the law's sign(v) goes from rest to sliding; close to the paper's discontinuous sign."""
+
+INTEGRAL_RATE, COMPLIANT_RATE = 0.5, 4.0
+"""1/s; a of ``integral``, by trial, before the search: of the error from the target, and of that from the spring."""
 
 STEP = 1e-4
 """s; half the distance of the central difference that gives the rates of the gains, exact to 1e-7 of them."""
@@ -119,6 +123,19 @@ def _inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms)
     options={"force_first": True},
     order=14,
 )
+@register(
+    controller="backstepping-integral",
+    about="The paper's law with weight compensation and an integral of the position error: no stiffness for slow pushes.",
+    options={"weight_compensation": True, "integral_rate": INTEGRAL_RATE},
+    order=16,
+)
+@register(
+    controller="backstepping-integral-compliant",
+    about="The paper's law with weight compensation and an integral of the distance from the spring under the measured force.",
+    options={"weight_compensation": True, "integral_rate": COMPLIANT_RATE, "integral_compliance": True},
+    needs={"force sensor"},
+    order=17,
+)
 class BacksteppingController(StagedController):
     """Backstepping control of position, pneumatic and closed-loop stiffness (Herzig et al. 2015, section IV and Fig. 3).
 
@@ -140,6 +157,11 @@ class BacksteppingController(StagedController):
         force_first: where a valve of two saturates, give up pneumatic stiffness to keep the force. The paper's law gives up
             some of both. A push that drives cylinder 2 fast into an emptying chamber then makes it stiffer than wanted. Both
             its valves drain, no force is left to come back, and the episode is lost.
+        integral_rate: a, 1/s, at which a force that the law is not told is found from the position error (``integral``); zero
+            is the paper's law. From the target's distance it takes slow pushes of a hand for errors of the model, so that no
+            stiffness is left for these, and the law declares no impedance.
+        integral_compliance: integrate the distance from where the spring asked for would be under the measured force. The law
+            then needs a force sensor, and keeps its stiffness.
 
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
     damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where
@@ -160,6 +182,8 @@ class BacksteppingController(StagedController):
         frozen_friction: bool = False,
         valves: str = "two_valves",
         force_first: bool = False,
+        integral_rate: float = 0.0,
+        integral_compliance: bool = False,
     ) -> None:
         ratio = 1.0 if damping_ratio is None else damping_ratio
         for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
@@ -167,11 +191,22 @@ class BacksteppingController(StagedController):
                 raise ValueError(f"{name} = {shown(value)}; allowed: a positive number{limits(least=1e-6, most=1e6)}")
         if not isinstance(valves, str) or valves not in VALVE_LAYOUTS:
             raise ValueError(f"valves = {shown(valves)}; allowed: {', '.join(VALVE_LAYOUTS)}")
-        flags = {"weight_compensation": weight_compensation, "frozen_friction": frozen_friction, "force_first": force_first}
+        if not is_within(integral_rate, least=0.0, most=1e6):
+            raise ValueError(f"integral_rate = {shown(integral_rate)}; allowed: zero or a positive number{limits(most=1e6)}")
+        flags = {
+            "weight_compensation": weight_compensation,
+            "frozen_friction": frozen_friction,
+            "force_first": force_first,
+            "integral_compliance": integral_compliance,
+        }
         check_flags(flags)
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
+        if integral_compliance and integral_rate == 0.0:
+            raise ValueError("integral_compliance = True; allowed: False with integral_rate = 0, which integrates nothing")
         super().__init__(parameters)
+        self.integral_rate, self.integral_compliance = float(integral_rate), bool(integral_compliance)
+        self.reads_force = self.integral_compliance
         self.damping_ratio, self.frozen_friction, self.valves = plain(damping_ratio), bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
@@ -185,12 +220,25 @@ class BacksteppingController(StagedController):
             force_first=self.force_first,
         )
 
-    def declared_impedance(self, reference: Reference) -> Impedance:
-        """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
-        return paper_impedance(reference, self.parameters, self.damping_ratio)
+    def declared_impedance(self, reference: Reference) -> Impedance | None:
+        """What the gains render to slow pushes at the reference pose, over N lanes; None where an integral takes these away.
+
+        Raises ``ValueError`` where there are no gains."""
+        rendered = paper_impedance(reference, self.parameters, self.damping_ratio)
+        return None if self.integral_rate > 0.0 and not self.integral_compliance else rendered
 
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
-        law = ControllerStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
+        if self.integral_rate > 0.0:
+            constants = integral.Constants.numbers(
+                options=self._options,
+                period=self.parameters.electronics.control_period,
+                integral_rate=self.integral_rate,
+                compliant=self.integral_compliance,
+                rig=self._p,
+            )
+            law = ControllerStage(integral.control, constants, integral.Integrated.lane())
+        else:
+            law = ControllerStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
