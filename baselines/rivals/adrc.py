@@ -106,7 +106,7 @@ class ActiveDisturbanceRejection(TrackingController):
         "bandwidth": (10.0, 100.0, 65.0, 40.0),
         "damping": (0.3, 2.0, 0.7, 0.7),
         "observer_bandwidth": (10.0, 800.0, 400.0, 100.0),
-        "force_rate": (30.0, 300.0, 120.0, 160.0),
+        "force_rate": (30.0, 300.0, 120.0, 100.0),
         "friction_fraction": (0.0, 1.0, 0.8, 1.0),
     }
 

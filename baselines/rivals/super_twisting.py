@@ -108,8 +108,8 @@ class SuperTwisting(TrackingController):
 
     LAW, CONSTANTS, MEMORY = staticmethod(control), Constants, Twisting
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "surface_rate": (10.0, 100.0, 50.0, 25.0),
-        "rate_bound": (1e2, 1e6, 3e4, 1e4),
+        "surface_rate": (10.0, 100.0, 42.0, 25.0),
+        "rate_bound": (1e2, 1e6, 1e4, 1e4),
         "friction_fraction": (0.0, 1.0, 0.9, 1.0),
         "dead_zone": (0.0, 5e-4, 2e-5, 6e-5),
     }
