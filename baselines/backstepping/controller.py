@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -129,13 +130,6 @@ def _inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms)
     options={"weight_compensation": True, "integral_rate": INTEGRAL_RATE},
     order=16,
 )
-@register(
-    controller="backstepping-integral-compliant",
-    about="The paper's law with weight compensation and an integral of the distance from the spring under the measured force.",
-    options={"weight_compensation": True, "integral_rate": COMPLIANT_RATE, "integral_compliance": True},
-    needs={"force sensor"},
-    order=17,
-)
 class BacksteppingController(StagedController):
     """Backstepping control of position, pneumatic and closed-loop stiffness (Herzig et al. 2015, section IV and Fig. 3).
 
@@ -158,10 +152,8 @@ class BacksteppingController(StagedController):
             some of both. A push that drives cylinder 2 fast into an emptying chamber then makes it stiffer than wanted. Both
             its valves drain, no force is left to come back, and the episode is lost.
         integral_rate: a, 1/s, at which a force that the law is not told is found from the position error (``integral``); zero
-            is the paper's law. From the target's distance it takes slow pushes of a hand for errors of the model, so that no
-            stiffness is left for these, and the law declares no impedance.
-        integral_compliance: integrate the distance from where the spring asked for would be under the measured force. The law
-            then needs a force sensor, and keeps its stiffness.
+            is the paper's law. It takes slow pushes of a hand for errors of the model, so that no stiffness is left for these,
+            and the law declares no impedance. ``CompliantBackstepping`` keeps the stiffness.
 
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
     damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where
@@ -171,6 +163,8 @@ class BacksteppingController(StagedController):
     """
 
     reads_force = False
+    integrates_from_spring: ClassVar[bool] = False
+    """Whether it integrates the distance from the spring under the measured force, or that from the target."""
 
     def __init__(
         self,
@@ -183,7 +177,6 @@ class BacksteppingController(StagedController):
         valves: str = "two_valves",
         force_first: bool = False,
         integral_rate: float = 0.0,
-        integral_compliance: bool = False,
     ) -> None:
         ratio = 1.0 if damping_ratio is None else damping_ratio
         for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
@@ -193,20 +186,12 @@ class BacksteppingController(StagedController):
             raise ValueError(f"valves = {shown(valves)}; allowed: {', '.join(VALVE_LAYOUTS)}")
         if not is_within(integral_rate, least=0.0, most=1e6):
             raise ValueError(f"integral_rate = {shown(integral_rate)}; allowed: zero or a positive number{limits(most=1e6)}")
-        flags = {
-            "weight_compensation": weight_compensation,
-            "frozen_friction": frozen_friction,
-            "force_first": force_first,
-            "integral_compliance": integral_compliance,
-        }
+        flags = {"weight_compensation": weight_compensation, "frozen_friction": frozen_friction, "force_first": force_first}
         check_flags(flags)
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
-        if integral_compliance and integral_rate == 0.0:
-            raise ValueError("integral_compliance = True; allowed: False with integral_rate = 0, which integrates nothing")
         super().__init__(parameters)
-        self.integral_rate, self.integral_compliance = float(integral_rate), bool(integral_compliance)
-        self.reads_force = self.integral_compliance
+        self.integral_rate = float(integral_rate)
         self.damping_ratio, self.frozen_friction, self.valves = plain(damping_ratio), bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
@@ -225,7 +210,7 @@ class BacksteppingController(StagedController):
 
         Raises ``ValueError`` where there are no gains."""
         rendered = paper_impedance(reference, self.parameters, self.damping_ratio)
-        return None if self.integral_rate > 0.0 and not self.integral_compliance else rendered
+        return None if self.integral_rate > 0.0 and not self.integrates_from_spring else rendered
 
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         if self.integral_rate > 0.0:
@@ -233,7 +218,7 @@ class BacksteppingController(StagedController):
                 options=self._options,
                 period=self.parameters.electronics.control_period,
                 integral_rate=self.integral_rate,
-                compliant=self.integral_compliance,
+                compliant=self.integrates_from_spring,
                 rig=self._p,
             )
             law = ControllerStage(integral.control, constants, integral.Integrated.lane())
@@ -289,3 +274,32 @@ class BacksteppingController(StagedController):
         return BacksteppingTerms(
             joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate
         )
+
+
+@register(
+    controller="backstepping-integral-compliant",
+    about="The paper's law with weight compensation and an integral of the distance from the spring under the measured force.",
+    needs={"force sensor"},
+    order=17,
+)
+class CompliantBackstepping(BacksteppingController):
+    """The paper's law with integral action that keeps its stiffness, and needs a force sensor (``integral``).
+
+    Arguments: ``parameters`` and ``weight_compensation`` as in ``BacksteppingController``; integral_rate: a, 1/s.
+    Raises ``ValueError`` for a rate that is not positive.
+    """
+
+    reads_force = True
+    integrates_from_spring = True
+
+    def __init__(
+        self,
+        parameters: Parameters | str | Path | None = None,
+        integral_rate: float = COMPLIANT_RATE,
+        weight_compensation: bool = True,
+    ) -> None:
+        if not is_within(integral_rate, least=1e-6, most=1e6):
+            raise ValueError(
+                f"integral_rate = {shown(integral_rate)}; allowed: a positive number{limits(least=1e-6, most=1e6)}"
+            )
+        super().__init__(parameters, weight_compensation, integral_rate=integral_rate)

@@ -1,7 +1,7 @@
 """Integral action in the paper's law: a force that it is to believe in, which grows with the position error.
 
 The law takes a force that acts along a piston off F*, and its rate off dF*/dt. What its model lacks (weight, friction, a wrong
-mass) is such a force. With the error (ex, ey) of the end effector and the stiffness asked for, it is found at the rate a:
+mass) is such a force. With the error (ex, ey) of the end effector and the stiffness asked for, without coupling as in (18), it is found at the rate a:
     dI/dt = a J^T K (ex, ey).
 At rest the law leaves J^T K (ex, ey) = f - I of a force f that nobody told it, so that dI/dt = a (f - I). As in integral
 backstepping (R. Skjetne and T. I. Fossen, Proceedings of OCEANS 2004) the error is driven to zero whatever the constant force;
@@ -18,7 +18,6 @@ from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.law import Options
 from baselines.estimation.stages import PistonEstimate
 from birthsim_env.loop.rows import Feedforward, Seen
-from birthsim_env.loop.signals import compliance
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Rig
@@ -52,12 +51,11 @@ def control(world: int, seen: Seen, memory: Integrated, constants: Constants, ta
         _, r2, _, _, _, kappa, sine, cosine = geometry.pose(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
-        kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
-        away_x, away_y = compliance(seen.user_force[0, i], seen.user_force[1, i], kx, ky, kxy)
+        kx, ky = asked.stiffness[0, i], asked.stiffness[1, i]
         ex, ey = r2 * sine - asked.position[0, i], -r2 * cosine - asked.position[1, i]
         if constants.compliant > 0.0:
-            ex, ey = ex - away_x, ey - away_y
-        push_x, push_y = kx * ex + kxy * ey, kxy * ex + ky * ey
+            ex, ey = ex - seen.user_force[0, i] / kx, ey - seen.user_force[1, i] / ky
+        push_x, push_y = kx * ex, ky * ey
         found.rate[0, i] = -constants.integral_rate * kappa * (cosine * push_x + sine * push_y)
         found.rate[1, i] = constants.integral_rate * (sine * push_x - cosine * push_y)
         for k in range(2):

@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines.backstepping.controller import BacksteppingController
+from baselines.backstepping.controller import BacksteppingController, CompliantBackstepping
 from baselines.backstepping.integral import Integrated
+from baselines.named import uses_force
 from birthsim_env.physics.compiled.lanes import Array
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import IDEAL
@@ -17,7 +18,8 @@ REFERENCE = closed_loop.holding(np.array([[0.5], [0.02]]), 2000.0)
 
 def strayed(mass: float, push: Array, seconds: float, compliant: bool) -> Array:
     """Distance from the target (T, 2), m, at 1 kHz, on a rig without friction that weighs ``mass`` kg in place of 3."""
-    law = BacksteppingController(IDEAL, weight_compensation=True, integral_rate=RATE, integral_compliance=compliant)
+    kind = CompliantBackstepping if compliant else BacksteppingController
+    law = kind(IDEAL, weight_compensation=True, integral_rate=RATE)
     plant, path = closed_loop.resting_at(REFERENCE, IDEAL.replace({"mechanics.mass": mass})), []
     for _ in closed_loop.run(plant, law.command, lambda t: REFERENCE, lambda t: push * min(1.0, 2 * t), seconds):
         path.append((plant.end_effector()[:2] - REFERENCE.position)[:, 0])
@@ -62,22 +64,17 @@ def test_it_rests_while_a_valve_is_full_and_leaves_what_it_was_told() -> None:
 
 
 def test_what_it_needs_and_declares() -> None:
-    literal, compliant = (BacksteppingController(integral_rate=1.0, integral_compliance=one) for one in (False, True))
+    literal, compliant = BacksteppingController(integral_rate=1.0), CompliantBackstepping()
     assert (literal.reads_force, compliant.reads_force) == (False, True)
+    assert [uses_force(f"backstepping-integral{more}") for more in ("", "-compliant")] == [False, True]
     assert literal.declared_impedance(REFERENCE) is None
     declared = compliant.declared_impedance(REFERENCE)
     assert declared is not None
     np.testing.assert_array_equal(declared.stiffness, BacksteppingController().declared_impedance(REFERENCE).stiffness)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"integral_rate": -1.0}, "integral_rate = -1.0; allowed: zero or a positive number"),
-        ({"integral_rate": 1.0, "integral_compliance": 2}, "integral_compliance = 2; allowed: True or False"),
-        ({"integral_compliance": True}, "integral_compliance = True; allowed: False with integral_rate = 0"),
-    ],
-)
-def test_other_options_are_refused(options: dict[str, float], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        BacksteppingController(**options)
+def test_other_rates_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"integral_rate = -1\.0; allowed: zero or a positive number"):
+        BacksteppingController(integral_rate=-1.0)
+    with pytest.raises(ValueError, match=r"integral_rate = 0\.0; allowed: a positive number"):
+        CompliantBackstepping(integral_rate=0.0)
