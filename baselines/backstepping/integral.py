@@ -1,7 +1,8 @@
 """Integral action in the paper's law: a force that it is to believe in, which grows with the position error.
 
 The law takes a force that acts along a piston off F*, and its rate off dF*/dt. What its model lacks (weight, friction, a wrong
-mass) is such a force. With the error (ex, ey) of the end effector and the stiffness asked for, without coupling as in (18), it is found at the rate a:
+mass) is such a force. With the error (ex, ey) of the end effector and the stiffness K asked for, without coupling as in (18),
+it is found at the rate a:
     dI/dt = a J^T K (ex, ey).
 At rest the law leaves J^T K (ex, ey) = f - I of a force f that nobody told it, so that dI/dt = a (f - I). As in integral
 backstepping (R. Skjetne and T. I. Fossen, Proceedings of OCEANS 2004) the error is driven to zero whatever the constant force;
@@ -53,9 +54,9 @@ def control(world: int, seen: Seen, memory: Integrated, constants: Constants, ta
         )
         kx, ky = asked.stiffness[0, i], asked.stiffness[1, i]
         ex, ey = r2 * sine - asked.position[0, i], -r2 * cosine - asked.position[1, i]
-        if constants.compliant > 0.0:
-            ex, ey = ex - seen.user_force[0, i] / kx, ey - seen.user_force[1, i] / ky
         push_x, push_y = kx * ex, ky * ey
+        if constants.compliant > 0.0:
+            push_x, push_y = push_x - seen.user_force[0, i], push_y - seen.user_force[1, i]
         found.rate[0, i] = -constants.integral_rate * kappa * (cosine * push_x + sine * push_y)
         found.rate[1, i] = constants.integral_rate * (sine * push_x - cosine * push_y)
         for k in range(2):
