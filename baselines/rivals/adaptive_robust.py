@@ -15,6 +15,9 @@ by itself would settle at the rate a: gamma = a k m_e/phi^2, with the level Fc i
 which both pistons learn. Yao's second step, which adds -s to u, is left out, and b is high instead. It is phi theta that comes
 near the truth; how it is shared out between mass and load, which differ by the motion's acceleration alone, says little.
 
+The admittance family learns share and load too (``baselines.estimation.friction_level``), by least mean squares of the force
+that its observer finds unexplained, where this law learns from the tracking error.
+
 While the reference rests (S = 0, the mass acts like a load) this is a PID on the force whose integral, the load, has bounds.
 
 Gains by trial (a few values each, before the search).
@@ -27,7 +30,7 @@ from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.estimation import dry_friction
 from baselines.rivals.feedforward import Tracking, friction_ahead
 from baselines.rivals.piston_loop import open_valves, piston_error
-from baselines.rivals.tracking import TrackingController
+from baselines.rivals.tracking import TrackingController, is_full
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Rig
@@ -105,7 +108,7 @@ def control(world: int, seen: Seen, memory: Learned, constants: Constants, table
             force_rate = drag_rate - mass * (lam * acceleration + (1.0 + inside) * k * s_rate)
             rate = tracked.needed.rate[cylinder, i] + force_rate + b * (force - now.excess)
             opened = open_valves(seen, cylinder, i, rate, constants.pneumatic_gain, now.air, p)
-            if max(abs(opened[0]), abs(opened[1])) < 1.0:
+            if not is_full(opened):
                 pace = period * constants.learning_rate * k * beyond(s, lam * constants.dead_zone / now.scale)
                 sign, _ = friction_ahead(vd, 0.0, 1.0, 0.0)
                 share = limit(share - pace * mass * sign / max(level, 1.0), -fed, MOST_SHARE - fed)

@@ -11,7 +11,8 @@ D is measured, not commanded, so that a saturated valve winds nothing up. The ob
 then corrects by the gains of the fading-memory filter, whose triple pole 1/(1 + o T) no bandwidth makes unstable.
 
 From D and e to z3 this is a disturbance observer with Q = o^3/(s + o)^3 (``disturbance_observer``); what differs is that the
-feedback, too, takes the observer's states in place of the measured ones.
+feedback, too, takes the observer's states in place of the measured ones. The admittance family has an extended state of the
+speed alone (``baselines.estimation.disturbance_observer``), which is the reduced-order form of this observer.
 
 Gains by trial (a few values each, before the search).
 """

@@ -11,6 +11,8 @@ and damping zeta is that of the nominal model, and the force is followed at the 
 dD*/dt with the acceleration (D - Fv de/dt)/m_e + d^. D is measured, not commanded: a saturated valve winds nothing up.
 
 With Q = o^3/(s + o)^3 and without Fv the observer would be that of ``adrc``, and with an average over L that of ``time_delay``.
+The admittance family contains one from the measured speed (``baselines.estimation.disturbance_observer``), Q = w^2/(s + w)^2.
+What it finds goes into a stiff backstepping loop there, in place of the second-order one here.
 
 Gains by trial (a few values each, before the search).
 """

@@ -25,7 +25,7 @@ from typing import ClassVar
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracking
 from baselines.rivals.piston_loop import open_valves, piston_error
-from baselines.rivals.tracking import TrackingController
+from baselines.rivals.tracking import TrackingController, is_full
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -158,7 +158,7 @@ def control(world: int, seen: Seen, memory: Laps, constants: Constants, tables: 
             given_rate = -mass * w * (w * v + 2.0 * zeta * (now.excess - known) / mass)
             rate = tracked.needed.rate[cylinder, i] + known_rate + given_rate + b * (known + given - now.excess)
             opened = open_valves(seen, cylinder, i, rate, constants.pneumatic_gain, now.air, p)
-            if max(abs(opened[0]), abs(opened[1])) < 1.0:
+            if not is_full(opened):
                 memory.total[cylinder, i] += now.excess - known
                 memory.count[cylinder, i] += 1.0
             memory.fresh[cylinder, i] = 0.0

@@ -24,7 +24,7 @@ from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracking
 from baselines.rivals.piston_loop import open_valves, piston_error
-from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
+from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held, is_full
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Rig
@@ -86,7 +86,7 @@ def control(world: int, seen: Seen, memory: Twisting, constants: Constants, tabl
             rate = tracked.needed.rate[cylinder, i] + mass * turned
             opened = open_valves(seen, cylinder, i, rate, constants.pneumatic_gain, now.air, p)
             carry_on(memory, cylinder, i, summed, slope, period, opened)
-            if max(abs(opened[0]), abs(opened[1])) < 1.0:
+            if not is_full(opened):
                 memory.sign[cylinder, i] = sign
     return 0
 

@@ -31,13 +31,19 @@ def held(memory: Integrals, cylinder: int, i: int, first: float) -> float:
 
 
 @helper
+def is_full(openings: tuple[float, float]) -> bool:
+    """Whether a valve of a cylinder saturates."""
+    opening_p, opening_n = openings
+    return max(abs(opening_p), abs(opening_n)) >= 1.0
+
+
+@helper
 def carry_on(
     memory: Integrals, cylinder: int, i: int, integral: float, rate: float, period: float, openings: tuple[float, float]
 ) -> None:
     """Takes the integral to the next period; it rests while a valve of the cylinder saturates (conditional integration)."""
-    opening_p, opening_n = openings
-    full = max(abs(opening_p), abs(opening_n)) >= 1.0
-    memory.integral[cylinder, i], memory.fresh[cylinder, i] = integral if full else integral + period * rate, 0.0
+    memory.integral[cylinder, i] = integral if is_full(openings) else integral + period * rate
+    memory.fresh[cylinder, i] = 0.0
 
 
 class TrackingController(StagedController, ABC):
