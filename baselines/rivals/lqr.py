@@ -19,8 +19,8 @@ import numpy as np
 from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracking
+from baselines.rivals.piston_loop import open_valves, piston_error
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
-from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
@@ -99,28 +99,19 @@ class Constants(Numbers):
 def control(world: int, seen: Seen, memory: Integrals, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, m s, on."""
     tracked, p = Tracking(seen.intermediate[: Tracking.size]), constants.rig
-    pressure, opening = seen.pressure, seen.opening
-    setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
-    wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
-    lowest, step, zone, c4 = constants.lowest, constants.step, constants.dead_zone, constants.pneumatic_gain
+    lowest, step, zone = constants.lowest, constants.step, constants.dead_zone
     for cylinder in range(2):
-        row, gain = 2 * cylinder, 4 * cylinder
-        ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
+        gain = 4 * cylinder
         for i in range(n):
-            y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
-            scale = needed.kappa[i] if cylinder == 0 else 1.0
-            place = (needed.kappa[i] - lowest) / step
+            now = piston_error(tracked, seen, cylinder, i, p)
+            place = (tracked.needed.kappa[i] - lowest) / step
             k1, k2 = scheduled(constants.table, gain, place), scheduled(constants.table, gain + 1, place)
             k3, k4 = scheduled(constants.table, gain + 2, place), scheduled(constants.table, gain + 3, place)
-            error, excess = y - wanted.position[cylinder, i], pp * ap - pn * an - needed.force[cylinder, i]
-            summed = held(memory, cylinder, i, -k4 * excess / k1)
-            wish = k1 * summed + k2 * error + k3 * (v - wanted.speed[cylinder, i]) + k4 * excess
-            air = air_at(cylinder, pp, pn, y, v, p)
-            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness_of(air, p) - setpoint[cylinder, i])
-            rate = needed.rate[cylinder, i] - wish
-            opened = two_valve_openings(rate, stiffness_rate, air, p)
-            opening[row, i], opening[row + 1, i] = opened
-            slope = beyond(error, zone / scale)
+            summed = held(memory, cylinder, i, -k4 * now.excess / k1)
+            wish = k1 * summed + k2 * now.error + k3 * now.error_rate + k4 * now.excess
+            rate = tracked.needed.rate[cylinder, i] - wish
+            opened = open_valves(seen, cylinder, i, rate, constants.pneumatic_gain, now.air, p)
+            slope = beyond(now.error, zone / now.scale)
             carry_on(memory, cylinder, i, summed, slope, constants.period, opened)
     return 0
 

@@ -18,8 +18,8 @@ from typing import ClassVar
 from baselines.admittance.law import beyond
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracking
+from baselines.rivals.piston_loop import open_valves, piston_error
 from baselines.rivals.tracking import Integrals, TrackingController, carry_on, held
-from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Rig
@@ -43,32 +43,20 @@ class Constants(Numbers):
 def control(world: int, seen: Seen, memory: Integrals, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, m s, on."""
     tracked, p = Tracking(seen.intermediate[: Tracking.size]), constants.rig
-    pressure, opening = seen.pressure, seen.opening
-    setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
-    wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
-    r, reaching, inside = constants.surface_rate, constants.reaching_rate, constants.layer_rate
-    zone, c4 = constants.dead_zone, constants.pneumatic_gain
+    r, reaching, inside, zone = constants.surface_rate, constants.reaching_rate, constants.layer_rate, constants.dead_zone
     for cylinder in range(2):
-        row = 2 * cylinder
-        ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
         viscous = p.fv1 if cylinder == 0 else p.fv2
         for i in range(n):
-            y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
-            scale = needed.kappa[i] if cylinder == 0 else 1.0
-            mass = p.mass * scale * scale
-            excess = pp * ap - pn * an - needed.force[cylinder, i]
-            error, error_rate = y - wanted.position[cylinder, i], v - wanted.speed[cylinder, i]
-            second = (excess - viscous * error_rate) / mass
-            summed = held(memory, cylinder, i, -excess / (mass * r * r * r))
-            slope = beyond(error, zone / scale)
-            surface = scale * (second + r * (3.0 * error_rate + r * (3.0 * error + r * summed)))
-            switched = max(-reaching, min(reaching, inside * surface)) / scale
+            now = piston_error(tracked, seen, cylinder, i, p)
+            mass, error_rate = now.mass, now.error_rate
+            second = (now.excess - viscous * error_rate) / mass
+            summed = held(memory, cylinder, i, -now.excess / (mass * r * r * r))
+            slope = beyond(now.error, zone / now.scale)
+            surface = now.scale * (second + r * (3.0 * error_rate + r * (3.0 * now.error + r * summed)))
+            switched = max(-reaching, min(reaching, inside * surface)) / now.scale
             turned = viscous / mass * second - r * (3.0 * second + r * (3.0 * error_rate + r * slope)) - switched
-            rate = needed.rate[cylinder, i] + mass * turned
-            air = air_at(cylinder, pp, pn, y, v, p)
-            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness_of(air, p) - setpoint[cylinder, i])
-            opened = two_valve_openings(rate, stiffness_rate, air, p)
-            opening[row, i], opening[row + 1, i] = opened
+            rate = tracked.needed.rate[cylinder, i] + mass * turned
+            opened = open_valves(seen, cylinder, i, rate, constants.pneumatic_gain, now.air, p)
             carry_on(memory, cylinder, i, summed, slope, constants.period, opened)
     return 0
 

@@ -31,13 +31,19 @@ def held(memory: Integrals, cylinder: int, i: int, first: float) -> float:
 
 
 @helper
+def is_full(openings: tuple[float, float]) -> bool:
+    """Whether a valve of a cylinder saturates."""
+    opening_p, opening_n = openings
+    return max(abs(opening_p), abs(opening_n)) >= 1.0
+
+
+@helper
 def carry_on(
     memory: Integrals, cylinder: int, i: int, integral: float, rate: float, period: float, openings: tuple[float, float]
 ) -> None:
     """Takes the integral to the next period; it rests while a valve of the cylinder saturates (conditional integration)."""
-    opening_p, opening_n = openings
-    full = max(abs(opening_p), abs(opening_n)) >= 1.0
-    memory.integral[cylinder, i], memory.fresh[cylinder, i] = integral if full else integral + period * rate, 0.0
+    memory.integral[cylinder, i] = integral if is_full(openings) else integral + period * rate
+    memory.fresh[cylinder, i] = 0.0
 
 
 class TrackingController(StagedController, ABC):
@@ -49,15 +55,17 @@ class TrackingController(StagedController, ABC):
 
     ``GAINS`` is gain -> (lowest, highest, for exact, for sampled positions): what ``birthsim tune`` is to try and what it
     found. All have ``friction_fraction``, how much believed Coulomb friction is fed forward with the sign of the reference
-    speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The integrals start from the
-    forces that the chambers hold (bumpless start). From sampled positions an observer estimates the speeds.
-    ``LAW`` is the law as a stage, which carries its ``Integrals`` on. ``CONSTANTS`` are its constants: the control ``period``,
-    s, what ``_design`` gives, and the ``rig``.
+    speed; those that integrate errors have ``dead_zone``, the error at the end effector, m, up to which nothing is integrated.
+    What they remember starts from the forces that the chambers hold (bumpless start). From sampled positions an observer
+    estimates the speeds.
+    ``LAW`` is the law as a stage, which carries its ``MEMORY`` on, in which ``fresh`` is 1 where a lane starts. ``CONSTANTS``
+    are its constants: the control ``period``, s, what ``_design`` gives, and the ``rig``.
     Raises ``ValueError`` for unknown gains and for gains that are not positive (zero where the lowest to try is zero).
     """
 
     LAW: ClassVar[Callable[..., int]]
     CONSTANTS: ClassVar[type[Numbers]]
+    MEMORY: ClassVar[type[Rows]] = Integrals
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]]
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
     COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ("damping_factor",)
@@ -84,7 +92,7 @@ class TrackingController(StagedController, ABC):
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         rig, gains, design = self.parameters, self._gains[sampled], self._designs[sampled]
         constants = self.CONSTANTS.numbers(period=rig.electronics.control_period, rig=self._p, **design)
-        law = ControllerStage(self.LAW, constants, Integrals.lane(fresh=1.0))
+        law = ControllerStage(self.LAW, constants, self.MEMORY.lane(fresh=1.0))
         ahead = feedforward(rig, gains["friction_fraction"])
         return [compliant_motion(rig), pistons(rig, sampled, informed=True), ahead, law]
 

@@ -35,10 +35,10 @@ DOCS = "import sys; sys.path.insert(0, 'docs'); from _generate import PARTS; pri
 CONTRACTS = ("tests/contracts/test_controllers.py", "tests/contracts/test_bad_samples.py", "tests/contracts/test_copies.py")
 ADDED = {
     "controller": Recipe(
-        "adrc",
+        "force-pd",
         (*CONTRACTS, "tests/build/test_bits.py"),
         12,
-        (("-m", "birthsim", "evaluate", "--help"), ("-m", "birthsim", "run", "--controller", "adcr", "--out", "x")),
+        (("-m", "birthsim", "evaluate", "--help"), ("-m", "birthsim", "run", "--controller", "force-dp", "--out", "x")),
     ),
     "sensor": Recipe("camera", CONTRACTS[:1], 12, (("-m", "birthsim", "run", "--sensors", "no", "--out", "x"),)),
     "scenario": Recipe("crowning", ("tests/contracts/test_environments.py",), 2),
@@ -146,8 +146,8 @@ def test_a_controller_that_is_registered_makes_no_result_stale(tree, performed):
     line = ("-m", "birthsim", "study", "status")
     (status, said), (plain, before) = (run_in(place, *line) for place in (performed("controller"), tree))
     assert (status, plain) == (0, 0), said + before
-    assert "; lacks adrc" in said  # of what measures every controller
-    assert said.replace("; lacks adrc", "") == before
+    assert "; lacks force-pd" in said  # of what measures every controller
+    assert said.replace("; lacks force-pd", "") == before
 
 
 @pytest.mark.slow
