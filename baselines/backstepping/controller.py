@@ -3,11 +3,9 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
-from baselines.backstepping import integral
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.backstepping.impedance import paper_impedance
@@ -35,9 +33,6 @@ PNEUMATIC_GAIN = 30.0
 
 SIGN_WIDTH = 0.002
 """m/s; assumed: over this speed the law's sign(v) goes from rest to sliding; close to the paper's discontinuous sign."""
-
-INTEGRAL_RATE, COMPLIANT_RATE = 0.5, 4.0
-"""1/s; a of ``integral``, by trial, before the search: of the error from the target, and of that from the spring."""
 
 STEP = 1e-4
 """s; half the distance of the central difference that gives the rates of the gains, exact to 1e-7 of them."""
@@ -124,12 +119,6 @@ def _inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms)
     options={"force_first": True},
     order=14,
 )
-@register(
-    controller="backstepping-integral",
-    about="The paper's law with weight compensation and an integral of the position error: no stiffness for slow pushes.",
-    options={"weight_compensation": True, "integral_rate": INTEGRAL_RATE},
-    order=16,
-)
 class BacksteppingController(StagedController):
     """Backstepping control of position, pneumatic and closed-loop stiffness (Herzig et al. 2015, section IV and Fig. 3).
 
@@ -151,9 +140,6 @@ class BacksteppingController(StagedController):
         force_first: where a valve of two saturates, give up pneumatic stiffness to keep the force. The paper's law gives up
             some of both. A push that drives cylinder 2 fast into an emptying chamber then makes it stiffer than wanted. Both
             its valves drain, no force is left to come back, and the episode is lost.
-        integral_rate: a, 1/s, at which a force that the law is not told is found from the position error (``integral``); zero
-            is the paper's law. It takes slow pushes of a hand for errors of the model, so that no stiffness is left for these,
-            and the law declares no impedance. ``CompliantBackstepping`` keeps the stiffness.
 
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
     damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where
@@ -163,8 +149,6 @@ class BacksteppingController(StagedController):
     """
 
     reads_force = False
-    integrates_from_spring: ClassVar[bool] = False
-    """Whether it integrates the distance from the spring under the measured force, or that from the target."""
 
     def __init__(
         self,
@@ -176,7 +160,6 @@ class BacksteppingController(StagedController):
         frozen_friction: bool = False,
         valves: str = "two_valves",
         force_first: bool = False,
-        integral_rate: float = 0.0,
     ) -> None:
         ratio = 1.0 if damping_ratio is None else damping_ratio
         for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
@@ -184,14 +167,11 @@ class BacksteppingController(StagedController):
                 raise ValueError(f"{name} = {shown(value)}; allowed: a positive number{limits(least=1e-6, most=1e6)}")
         if not isinstance(valves, str) or valves not in VALVE_LAYOUTS:
             raise ValueError(f"valves = {shown(valves)}; allowed: {', '.join(VALVE_LAYOUTS)}")
-        if not is_within(integral_rate, least=0.0, most=1e6):
-            raise ValueError(f"integral_rate = {shown(integral_rate)}; allowed: zero or a positive number{limits(most=1e6)}")
         flags = {"weight_compensation": weight_compensation, "frozen_friction": frozen_friction, "force_first": force_first}
         check_flags(flags)
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
         super().__init__(parameters)
-        self.integral_rate = float(integral_rate)
         self.damping_ratio, self.frozen_friction, self.valves = plain(damping_ratio), bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
@@ -205,25 +185,12 @@ class BacksteppingController(StagedController):
             force_first=self.force_first,
         )
 
-    def declared_impedance(self, reference: Reference) -> Impedance | None:
-        """What the gains render to slow pushes at the reference pose, over N lanes; None where an integral takes these away.
-
-        Raises ``ValueError`` where there are no gains."""
-        rendered = paper_impedance(reference, self.parameters, self.damping_ratio)
-        return None if self.integral_rate > 0.0 and not self.integrates_from_spring else rendered
+    def declared_impedance(self, reference: Reference) -> Impedance:
+        """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
+        return paper_impedance(reference, self.parameters, self.damping_ratio)
 
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
-        if self.integral_rate > 0.0:
-            constants = integral.Constants.numbers(
-                options=self._options,
-                period=self.parameters.electronics.control_period,
-                integral_rate=self.integral_rate,
-                compliant=self.integrates_from_spring,
-                rig=self._p,
-            )
-            law = ControllerStage(integral.control, constants, integral.Integrated.lane())
-        else:
-            law = ControllerStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
+        law = ControllerStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
@@ -274,32 +241,3 @@ class BacksteppingController(StagedController):
         return BacksteppingTerms(
             joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate
         )
-
-
-@register(
-    controller="backstepping-integral-compliant",
-    about="The paper's law with weight compensation and an integral of the distance from the spring under the measured force.",
-    needs={"force sensor"},
-    order=17,
-)
-class CompliantBackstepping(BacksteppingController):
-    """The paper's law with integral action that keeps its stiffness, and needs a force sensor (``integral``).
-
-    Arguments: ``parameters`` and ``weight_compensation`` as in ``BacksteppingController``; integral_rate: a, 1/s.
-    Raises ``ValueError`` for a rate that is not positive.
-    """
-
-    reads_force = True
-    integrates_from_spring = True
-
-    def __init__(
-        self,
-        parameters: Parameters | str | Path | None = None,
-        integral_rate: float = COMPLIANT_RATE,
-        weight_compensation: bool = True,
-    ) -> None:
-        if not is_within(integral_rate, least=1e-6, most=1e6):
-            raise ValueError(
-                f"integral_rate = {shown(integral_rate)}; allowed: a positive number{limits(least=1e-6, most=1e6)}"
-            )
-        super().__init__(parameters, weight_compensation, integral_rate=integral_rate)

@@ -15,15 +15,25 @@ but a hand's push is such a force too:
 I rests while a valve of its cylinder saturates (conditional integration).
 """
 
+from pathlib import Path
+from typing import Any, ClassVar
+
 from baselines.backstepping import law as backstepping_law
+from baselines.backstepping.controller import BacksteppingController
 from baselines.backstepping.law import Options
+from baselines.controller import checked_gains
 from baselines.estimation.stages import PistonEstimate
+from baselines.impedance import Impedance
+from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Feedforward, Seen
+from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
 from birthsim_env.physics.linkage import geometry
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import register
 
 
 class Integrated(Rows):
@@ -70,3 +80,54 @@ def control(world: int, seen: Seen, memory: Integrated, constants: Constants, ta
             if max(abs(seen.opening[2 * k, i]), abs(seen.opening[2 * k + 1, i])) < 1.0:
                 memory.force[k, i] += constants.period * found.rate[k, i]
     return missed
+
+
+@register(
+    controller="backstepping-integral",
+    about="The paper's law with weight compensation and an integral of the position error: no stiffness for slow pushes.",
+    order=16,
+)
+class IntegralBackstepping(BacksteppingController):
+    """The paper's law with weight compensation and integral action (this module).
+
+    Arguments: ``parameters`` as in ``BacksteppingController``; integral_rate: a, 1/s.
+    Raises ``ValueError`` for a rate that is not positive.
+    """
+
+    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {"integral_rate": (0.1, 10.0)}
+    RATE: ClassVar[float] = 0.5
+    """1/s, by trial, before the search."""
+
+    compliant: ClassVar[bool] = False
+    """Whether it integrates the distance from the spring under the measured force, or that from the target."""
+
+    def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
+        gains = checked_gains(self, gains)
+        super().__init__(parameters, weight_compensation=True)
+        self.integral_rate = gains.get("integral_rate", self.RATE)
+
+    def declared_impedance(self, reference: Reference) -> Impedance | None:  # type: ignore[override]
+        """What the gains render to slow pushes, as the paper's law does; None where the integral takes that away."""
+        return super().declared_impedance(reference) if self.compliant else None
+
+    def controller_stages(self, sampled: bool) -> list[ControllerStage]:
+        *before, _ = super().controller_stages(sampled)
+        period = self.parameters.electronics.control_period
+        own: dict[str, Any] = {"integral_rate": self.integral_rate, "compliant": self.compliant}
+        constants = Constants.numbers(options=self._options, period=period, rig=self._p, **own)
+        return [*before, ControllerStage(control, constants, Integrated.lane())]
+
+
+@register(
+    controller="backstepping-integral-compliant",
+    about="The paper's law with weight compensation and an integral of the distance from the spring under the measured force.",
+    needs={"force sensor"},
+    order=17,
+)
+class CompliantBackstepping(IntegralBackstepping):
+    """The paper's law with integral action that keeps its stiffness, and needs a force sensor; arguments are the same."""
+
+    reads_force = True
+    compliant: ClassVar[bool] = True
+    RATE: ClassVar[float] = 4.0
+    """1/s, by trial, before the search."""

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines.backstepping.controller import BacksteppingController, CompliantBackstepping
-from baselines.backstepping.integral import Integrated
+from baselines.backstepping.controller import BacksteppingController
+from baselines.backstepping.integral import CompliantBackstepping, IntegralBackstepping, Integrated
 from baselines.named import uses_force
 from birthsim_env.physics.compiled.lanes import Array
 from tests.oracles import closed_loop
@@ -18,8 +18,7 @@ REFERENCE = closed_loop.holding(np.array([[0.5], [0.02]]), 2000.0)
 
 def strayed(mass: float, push: Array, seconds: float, compliant: bool) -> Array:
     """Distance from the target (T, 2), m, at 1 kHz, on a rig without friction that weighs ``mass`` kg in place of 3."""
-    kind = CompliantBackstepping if compliant else BacksteppingController
-    law = kind(IDEAL, weight_compensation=True, integral_rate=RATE)
+    law = (CompliantBackstepping if compliant else IntegralBackstepping)(IDEAL, integral_rate=RATE)
     plant, path = closed_loop.resting_at(REFERENCE, IDEAL.replace({"mechanics.mass": mass})), []
     for _ in closed_loop.run(plant, law.command, lambda t: REFERENCE, lambda t: push * min(1.0, 2 * t), seconds):
         path.append((plant.end_effector()[:2] - REFERENCE.position)[:, 0])
@@ -51,7 +50,7 @@ def test_a_push_that_is_not_measured_finds_none() -> None:
 
 def test_it_rests_while_a_valve_is_full_and_leaves_what_it_was_told() -> None:
     """Half a second far from the target changes neither the integrals nor the forces that the law is given."""
-    law = BacksteppingController(IDEAL, weight_compensation=True, integral_rate=RATE)
+    law = IntegralBackstepping(IDEAL, integral_rate=RATE)
     near = closed_loop.ideal(closed_loop.resting_at(REFERENCE, IDEAL), 0.0, np.zeros((2, 1)))
     far = dataclasses.replace(near, position=near.position + 0.06)
     given = {"feedforward_force": np.array([[3.0], [-2.0]]), "feedforward_rate": np.array([[30.0], [10.0]])}
@@ -64,7 +63,7 @@ def test_it_rests_while_a_valve_is_full_and_leaves_what_it_was_told() -> None:
 
 
 def test_what_it_needs_and_declares() -> None:
-    literal, compliant = BacksteppingController(integral_rate=1.0), CompliantBackstepping()
+    literal, compliant = IntegralBackstepping(), CompliantBackstepping()
     assert (literal.reads_force, compliant.reads_force) == (False, True)
     assert [uses_force(f"backstepping-integral{more}") for more in ("", "-compliant")] == [False, True]
     assert literal.declared_impedance(REFERENCE) is None
@@ -73,8 +72,7 @@ def test_what_it_needs_and_declares() -> None:
     np.testing.assert_array_equal(declared.stiffness, BacksteppingController().declared_impedance(REFERENCE).stiffness)
 
 
-def test_other_rates_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"integral_rate = -1\.0; allowed: zero or a positive number"):
-        BacksteppingController(integral_rate=-1.0)
+@pytest.mark.parametrize("kind", [IntegralBackstepping, CompliantBackstepping])
+def test_other_rates_are_refused(kind: type[IntegralBackstepping]) -> None:
     with pytest.raises(ValueError, match=r"integral_rate = 0\.0; allowed: a positive number"):
-        CompliantBackstepping(integral_rate=0.0)
+        kind(integral_rate=0.0)

@@ -123,7 +123,7 @@ def test_pistons_past_their_strokes_get_openings_that_valves_have(name):
     assert np.all(np.abs(made(name).command(measured, closed_loop.holding(measured.position, 2000.0))) <= 1)
 
 
-UNCOUPLED = ("backstepping", "backstepping-integral-compliant")
+UNCOUPLED = ("backstepping", "backstepping-integral", "backstepping-integral-compliant")
 """Laws of (18), which ignore a coupling of x and y."""
 
 WRONG = ((8, -500.0), (9, 0.0), (14, 2500.0), (14, -2000.0))
