@@ -95,8 +95,8 @@ class IntegralBackstepping(BacksteppingController):
     """
 
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {"integral_rate": (0.1, 10.0)}
-    RATE: ClassVar[float] = 0.5
-    """1/s, by trial, before the search."""
+    RATES: ClassVar[tuple[float, float]] = (0.1962, 0.1252)
+    """1/s, for exact and for sampled positions; ``birthsim tune`` found them, as those of ``baselines.rivals.pid``."""
 
     compliant: ClassVar[bool] = False
     """Whether it integrates the distance from the spring under the measured force, or that from the target."""
@@ -104,7 +104,7 @@ class IntegralBackstepping(BacksteppingController):
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         gains = checked_gains(self, gains)
         super().__init__(parameters, weight_compensation=True)
-        self.integral_rate = gains.get("integral_rate", self.RATE)
+        self._rates = [gains.get("integral_rate", rate) for rate in self.RATES]
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:  # type: ignore[override]
         """What the gains render to slow pushes, as the paper's law does; None where the integral takes that away."""
@@ -113,7 +113,7 @@ class IntegralBackstepping(BacksteppingController):
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         *before, _ = super().controller_stages(sampled)
         period = self.parameters.electronics.control_period
-        own: dict[str, Any] = {"integral_rate": self.integral_rate, "compliant": self.compliant}
+        own: dict[str, Any] = {"integral_rate": self._rates[sampled], "compliant": self.compliant}
         constants = Constants.numbers(options=self._options, period=period, rig=self._p, **own)
         return [*before, ControllerStage(control, constants, Integrated.lane())]
 
@@ -129,5 +129,4 @@ class CompliantBackstepping(IntegralBackstepping):
 
     reads_force = True
     compliant: ClassVar[bool] = True
-    RATE: ClassVar[float] = 4.0
-    """1/s, by trial, before the search."""
+    RATES: ClassVar[tuple[float, float]] = (4.449, 5.918)

@@ -20,7 +20,7 @@ that its observer finds unexplained, where this law learns from the tracking err
 
 While the reference rests (S = 0, the mass acts like a load) this is a PID on the force whose integral, the load, has bounds.
 
-Gains by trial (a few values each, before the search).
+Gains found by ``birthsim tune``, as those of ``pid``.
 """
 
 from typing import ClassVar
@@ -139,13 +139,13 @@ class AdaptiveRobust(TrackingController):
 
     LAW, CONSTANTS, MEMORY = staticmethod(control), Constants, Learned
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "error_rate": (10.0, 100.0, 40.0, 35.0),
-        "feedback_rate": (10.0, 100.0, 80.0, 40.0),
-        "robustness": (0.0, 20.0, 1.0, 5.0),
-        "learning_rate": (0.0, 60.0, 30.0, 15.0),
-        "force_rate": (30.0, 300.0, 160.0, 160.0),
-        "friction_fraction": (0.0, 1.0, 0.8, 1.0),
-        "dead_zone": (0.0, 5e-4, 2e-5, 2e-4),
+        "error_rate": (10.0, 100.0, 36.85, 24.31),
+        "feedback_rate": (10.0, 100.0, 25.2, 21.72),
+        "robustness": (0.0, 20.0, 19.01, 8.336),
+        "learning_rate": (0.0, 60.0, 52.98, 51.14),
+        "force_rate": (30.0, 300.0, 291.8, 276.6),
+        "friction_fraction": (0.0, 1.0, 0.775, 0.2918),
+        "dead_zone": (0.0, 5e-4, 6.794e-05, 0.0003282),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:

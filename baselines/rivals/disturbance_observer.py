@@ -14,7 +14,7 @@ With Q = o^3/(s + o)^3 and without Fv the observer would be that of ``adrc``, an
 The admittance family contains one from the measured speed (``baselines.estimation.disturbance_observer``), Q = w^2/(s + w)^2.
 What it finds goes into a stiff backstepping loop there, in place of the second-order one here.
 
-Gains by trial (a few values each, before the search).
+Gains found by ``birthsim tune``, as those of ``pid``.
 """
 
 from typing import ClassVar
@@ -96,11 +96,11 @@ class DisturbanceObserverControl(TrackingController):
 
     LAW, CONSTANTS, MEMORY = staticmethod(control), Constants, Filter
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "bandwidth": (10.0, 100.0, 65.0, 55.0),
-        "damping": (0.3, 2.0, 0.7, 1.0),
-        "filter_bandwidth": (10.0, 800.0, 400.0, 60.0),
-        "force_rate": (30.0, 300.0, 120.0, 100.0),
-        "friction_fraction": (0.0, 1.0, 0.8, 1.0),
+        "bandwidth": (10.0, 100.0, 53.85, 40.55),
+        "damping": (0.3, 2.0, 0.3238, 0.4),
+        "filter_bandwidth": (10.0, 800.0, 703.5, 206.5),
+        "force_rate": (30.0, 300.0, 291.7, 154.2),
+        "friction_fraction": (0.0, 1.0, 0.705, 0.5895),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:

@@ -14,7 +14,7 @@ s is that at the end effector (kappa s of cylinder 1). The term is sampled impli
 IEEE Transactions on Automatic Control 65(8), 2020): it asks for the s+ after the period that solves it with sign(s+), so that
 sampling alone causes no chatter; the lag of the spools still does where L is large. E and z rest while a valve saturates.
 
-Gains by trial (a few values each, before the search).
+Gains found by ``birthsim tune``, as those of ``pid``.
 """
 
 import math
@@ -108,10 +108,10 @@ class SuperTwisting(TrackingController):
 
     LAW, CONSTANTS, MEMORY = staticmethod(control), Constants, Twisting
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "surface_rate": (10.0, 100.0, 42.0, 25.0),
-        "rate_bound": (1e2, 1e6, 1e4, 1e4),
-        "friction_fraction": (0.0, 1.0, 0.9, 1.0),
-        "dead_zone": (0.0, 5e-4, 2e-5, 6e-5),
+        "surface_rate": (10.0, 100.0, 29.88, 24.75),
+        "rate_bound": (1e2, 1e6, 2.176e04, 4.798e04),
+        "friction_fraction": (0.0, 1.0, 0.8326, 0.903),
+        "dead_zone": (0.0, 5e-4, 3.181e-05, 4.223e-06),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:

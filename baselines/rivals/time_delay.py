@@ -14,7 +14,7 @@ is fed back at the rate g. The integral starts at s = 0, and rests while a valve
 The estimate is a disturbance observer (``disturbance_observer``) with the filter Q = (1 - exp(-L s))/(L s), and with g > 0
 there is an integrator beside it.
 
-Gains by trial (a few values each, before the search).
+Gains found by ``birthsim tune``, as those of ``pid``.
 """
 
 from typing import ClassVar
@@ -113,13 +113,13 @@ class TimeDelayControl(TrackingController):
 
     LAW, CONSTANTS, MEMORY = staticmethod(control), Constants, Past
     GAINS: ClassVar[dict[str, tuple[float, float, float, float]]] = {
-        "bandwidth": (10.0, 100.0, 65.0, 40.0),
-        "damping": (0.3, 2.0, 1.0, 0.7),
-        "delay": (1e-3, 4e-2, 3e-3, 1e-2),
-        "ideal_velocity_rate": (0.0, 60.0, 20.0, 0.0),
-        "force_rate": (30.0, 300.0, 120.0, 160.0),
-        "friction_fraction": (0.0, 1.0, 0.5, 1.0),
-        "dead_zone": (0.0, 5e-4, 1e-4, 1e-4),
+        "bandwidth": (10.0, 100.0, 20.7, 12.14),
+        "damping": (0.3, 2.0, 1.967, 1.883),
+        "delay": (1e-3, 4e-2, 0.001337, 0.004803),
+        "ideal_velocity_rate": (0.0, 60.0, 51.64, 29.88),
+        "force_rate": (30.0, 300.0, 296.7, 72.88),
+        "friction_fraction": (0.0, 1.0, 0.403, 0.0617),
+        "dead_zone": (0.0, 5e-4, 0.000272, 0.00044),
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
