@@ -9,9 +9,10 @@ from typing import Any, get_type_hints
 
 from baselines.controller import RESIDUAL, Controller, controller_of, is_ready, made_controller
 from baselines.limiter.controller import PortLimiter
-from baselines.staged import StagedController
+from baselines.staged import ControllerStage, StagedController
 from baselines.uncontrolled import Uncontrolled
 from birthsim_env.extras import installation
+from birthsim_env.loop.stage import layouts_of
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import near, shown
@@ -22,6 +23,12 @@ LIMITED = "limited:"
 
 GUARDING = ("on_fault", "fault_time")
 """Options of every compiled controller: what happens where a sensor says nothing finite, see ``StagedController.protect``."""
+
+LEARNS_MASS = "learns_mass"
+"""The constant of a stage that says whether the law learns the mass."""
+
+CONSTANTS = 3
+"""Of the arguments of a controller's stage that which has its constants."""
 
 OWN_FILE = ", or path/to/file.py:Class"
 
@@ -130,6 +137,36 @@ def uses_force(name: str) -> bool:
         return bool(getattr(make_controller(name), "reads_force", True))
     needs = known[plain].needs if policy is None else policies[policy].needs
     return "force sensor" in needs and bool(options.get("force_sensor", True))
+
+
+def learns_mass(name: str, sampled: bool = True, parameters: Parameters | None = None) -> bool:
+    """Whether a controller finds out that its rig has another mass than it believes.
+
+    A compiled law that can do so has a number ``learns_mass`` among the constants that its kernel reads, 1 where it does; any
+    other learns no mass. Options count. A policy learns it where the law that it corrects does, or the estimator that it reads.
+
+    Parameters
+    ----------
+    name
+        As ``make_controller`` takes it.
+    sampled
+        Whether positions are samples, as all sensors show them but ideal ones.
+    parameters
+        What it believes of the rig and its sensors.
+    """
+    law = make_controller(name.removeprefix(LIMITED), parameters)
+    stages = law.controller_stages(sampled) if isinstance(law, StagedController) else []
+    return any(_constant(stage, LEARNS_MASS) > 0.0 for stage in stages)
+
+
+def _constant(stage: ControllerStage, name: str) -> float:
+    """A number among the constants of a stage, by its name; zero where there is none."""
+    layout, first = layouts_of(stage.function)[CONSTANTS], 0
+    for own, _, _, count in layout.entries() if layout else ():
+        if own.endswith(name):
+            return float(stage.constants[first])
+        first += count
+    return 0.0
 
 
 def known_options(name: str) -> list[str] | None:

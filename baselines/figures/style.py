@@ -51,10 +51,12 @@ STYLE: Any = {
 
 
 def look(k: int, markers: bool = True) -> dict[str, Any]:
-    """Colour, line style and marker of the k-th of several controllers: twelve that a grey print tells apart by marker."""
+    """Colour, line style and marker of the k-th of several controllers: twelve that a grey print tells apart by marker, and
+    twelve more whose markers are hollow."""
     return {
         "color": COLOURS[k % len(COLOURS)], "linestyle": LINES[(k + k // len(COLOURS)) % len(LINES)],
         **({"marker": MARKERS[k % len(MARKERS)]} if markers else {}),
+        **({"mfc": "white"} if markers and k >= len(MARKERS) else {}),
     }  # fmt: skip
 
 

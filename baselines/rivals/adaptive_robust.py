@@ -63,6 +63,7 @@ class Constants(Numbers):
     feedback_rate = number("1/s", "k")
     robustness = number("m/s2", "h, at the end effector")
     learning_rate = number("1/s", "a")
+    learns_mass = number("1", "1 where the mass is learned, as it is at any rate but zero")
     force_rate = number("1/s", "b")
     friction_fraction = number("1", "of the Coulomb friction that is fed forward")
     dead_zone = number("m", "of the error, at the end effector")
@@ -115,7 +116,8 @@ def control(world: int, seen: Seen, memory: Learned, constants: Constants, table
                 load = limit(load - pace * mass, -most_load, most_load)
                 mass_rate -= pace * carried * p.mass / (STANDARD_GRAVITY * STANDARD_GRAVITY)
             memory.share[cylinder, i], memory.load[cylinder, i], memory.fresh[cylinder, i] = share, load, 0.0
-        memory.mass[i] = limit(memory.mass[i] + mass_rate, -most_mass, most_mass)
+        if constants.learns_mass > 0.0:
+            memory.mass[i] = limit(memory.mass[i] + mass_rate, -most_mass, most_mass)
     return 0
 
 
@@ -149,4 +151,4 @@ class AdaptiveRobust(TrackingController):
     }
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
-        return {"pneumatic_gain": PNEUMATIC_GAIN, **gains}
+        return {"pneumatic_gain": PNEUMATIC_GAIN, "learns_mass": gains["learning_rate"] > 0.0, **gains}

@@ -1,6 +1,6 @@
 """Every registered controller and policy: what it is, what it needs, and what its name is short for."""
 
-from baselines.named import compiled_names, resolved, uses_force, with_brackets
+from baselines.named import compiled_names, learns_mass, resolved, uses_force, with_brackets
 from birthsim_env.registry import Entry, entries
 
 
@@ -8,12 +8,23 @@ def controllers() -> str:
     """A table of controllers and one of policies."""
     compiled = compiled_names()
     rows = [
-        (f"`{one.name}`", one.about, _short_for(one.name), _needs(one, one.name), "yes" if one.name in compiled else "no")
+        (
+            f"`{one.name}`",
+            one.about,
+            _short_for(one.name),
+            _needs(one, one.name),
+            "yes" if learns_mass(one.name) else "no",
+            "yes" if one.name in compiled else "no",
+        )
         for one in entries("controller")
     ]
-    table = _table(("name", "what it is", "short for", "needs", "compiled"), rows)
-    policies = [(f"`residual:{one.name}`", _needs(one, f"residual:{one.name}")) for one in entries("policy")]
-    return f"{table}\n\n{_table(('policy that comes with the package', 'needs'), policies)}"
+    table = _table(("name", "what it is", "short for", "needs", "learns the mass", "compiled"), rows)
+    policies = [
+        (f"`{name}`", _needs(one, name), "yes" if learns_mass(name) else "no")
+        for one in entries("policy")
+        for name in [f"residual:{one.name}"]
+    ]
+    return f"{table}\n\n{_table(('policy that comes with the package', 'needs', 'learns the mass'), policies)}"
 
 
 def _short_for(name: str) -> str:

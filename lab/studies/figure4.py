@@ -6,6 +6,7 @@ from baselines.work.tasks import Result, Task
 from birthsim.commands.figure4 import metrics_of, record_run
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Options, Study
 from lab.engine.tables import markdown
@@ -21,11 +22,12 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "metric", "x or 1", "y or 2"]]
+    rows = [["controller", *information.COLUMNS, "metric", "x or 1", "y or 2"]]
     for controller, figures in content["figures"].items():
         for name, values in figures.items():
             if isinstance(values, list):
-                rows.append([f"`{controller}`", f"`{name}`", *(f"{value:.3f}" for value in values)])
+                facts = information.informed(controller, "ideal")
+                rows.append([f"`{controller}`", *facts, f"`{name}`", *(f"{value:.3f}" for value in values)])
     return {"figure4.md": markdown(rows) + "\n"}
 
 

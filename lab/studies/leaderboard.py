@@ -27,6 +27,7 @@ from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each, Listed
 from birthsim_env.physics.rig.values import in_line, shown
 from birthsim_env.registry import names, register
+from lab.engine import information
 from lab.engine.tables import markdown
 from lab.engine.worlds import worlds
 
@@ -179,7 +180,8 @@ def entry(path: Path) -> dict[str, Any]:
 def table() -> str:
     """The entries in Markdown, by environment and score, with the mean score of their episodes."""
     rows = [row(entry(path), path.stem) for path in entries()]
-    head = ["environment", "entry", "controller", "score", "settled error, mm, median", "95th percentile", "lost of 64"]
+    who = ["environment", "entry", "controller", *information.COLUMNS]
+    head = [*who, "score", "settled error, mm, median", "95th percentile", "lost of 64"]
     said = f"{worlds(RULES['seed'], RULES['episodes'])}, the same for every entry."
     return f"{said}\n\n{markdown([head, *(one for _, _, one in sorted(rows))])}\n"
 
@@ -191,4 +193,5 @@ def row(said: dict[str, Any], name: str) -> tuple[str, float, list[str]]:
     score = float(np.mean(normalized_score(environment, returns, RULES["sensors"])))
     error = summarize(penalize_lost(result["episodes"]["settled_rms"], result["lost"], applies=True))
     figures = [f"{score:.1f}", *(number(error[key]) for key in ("median", "q95")), str(sum(result["lost"]))]
-    return environment, -score, [f"`{environment}`", name, f"`{result['controller']}`", *figures]
+    facts = information.informed_if_registered(result["controller"], RULES["sensors"])
+    return environment, -score, [f"`{environment}`", name, f"`{result['controller']}`", *facts, *figures]

@@ -19,6 +19,7 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import LINEAR
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -104,11 +105,12 @@ def _figures(row: dict[str, Any]) -> list[str]:
 def _shown(content: Content) -> dict[str, str]:
     said = f"{worlds(content['settings']['seed'], content['settings']['episodes'])}; median / 95th percentile."
     heads = [head for _, _, head in COLUMNS.values()]
-    both = [["controller", "sensors", *(f"{head}: {rig}" for head in heads for rig in WHOLE)]]
+    both = [["controller", *information.COLUMNS, "sensors", *(f"{head}: {rig}" for head in heads for rig in WHOLE)]]
     found = {(row["controller"], row["sensors"], row["rig"]): row for row in content["figures"]}
     for controller, sensors in dict.fromkeys(key[:2] for key in found):
         before, after = (_figures(found[controller, sensors, rig]) for rig in WHOLE)
-        both.append([f"`{controller}`", sensors, *itertools.chain(*zip(before, after, strict=True))])
+        facts = information.informed(controller, sensors)
+        both.append([f"`{controller}`", *facts, sensors, *itertools.chain(*zip(before, after, strict=True))])
     parts = [["sensors", "what was measured", *heads]]
     for (controller, sensors, rig), row in found.items():
         if controller == content["settings"]["controller"][-1]:

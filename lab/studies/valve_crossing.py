@@ -20,6 +20,7 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.servovalves import LINEAR, MPYE_5_M5, Curve
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -79,11 +80,12 @@ def _crossing(value: float | None) -> str:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "sensors", "crossing", *(head for _, _, head in COLUMNS.values())]]
+    rows = [["controller", *information.COLUMNS, "sensors", "crossing", *(head for _, _, head in COLUMNS.values())]]
     for row in content["figures"]:
         if row["worlds"] == "judged":
             figures = [cells(row[name], " / ") for name in COLUMNS]
-            rows.append([f"`{row['controller']}`", row["sensors"], _crossing(row["crossing"]), *figures])
+            facts = information.informed(row["controller"], row["sensors"])
+            rows.append([f"`{row['controller']}`", *facts, row["sensors"], _crossing(row["crossing"]), *figures])
     count = content["settings"]["episodes"]
     chosen = f"The crossing was chosen on {worlds(CHOSEN, count)}, which the picture has too."
     said = f"{worlds(content['settings']['seed'], count)}. {chosen}"

@@ -128,3 +128,10 @@ def test_a_figure_of_another_name_has_other_identifiers(tmp_path):
     # Two drawings in one page must not share clip paths.
     assert texts[0]
     assert not texts[0] & texts[1]
+
+
+def test_twenty_four_controllers_have_marks_of_their_own():
+    """Whether or not lines join them, and with colours left out: marker, and whether it is hollow."""
+    marks = [style.look(k) for k in range(24)]
+    assert len({(one["marker"], one.get("mfc")) for one in marks}) == 24
+    assert style.look(23, markers=False).keys() == {"color", "linestyle"}

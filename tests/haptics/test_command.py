@@ -66,16 +66,16 @@ def test_stable_up_to_the_first_that_is_not():
 
 
 def test_tables_say_lost_and_refused():
-    run = {"controller": "mine", "sensors": "lab", "uses_force": False}
+    run = {"controller": "pid", "sensors": "lab", "uses_force": False}
     pieces = [
         {"stiffness": 500.0, "refused": None, "mean": [1.0, 2.0, None], "most": [3.0, 4.0, None], "lost": [False, False, True]},
         {"stiffness": 0.0, "refused": "stiffness setpoint ..."},
     ]
     table = backdriving_table([{**run, "backdriving": pieces}])
-    assert "| controller | sensors | uses the hand's force | at 500 N/m | at 0 N/m |" in table
-    assert "| mine | lab | no | 2; lost | refused |" in table
+    assert "| controller | rig | mass learned | force sensed | sensors | at 500 N/m | at 0 N/m |" in table
+    assert "| pid | default | no | no | lab | 2; lost | refused |" in table
     piece = {"lost": [False], "overshoot_mm": [5.0], "speed": [1.5], "kinetic": [3.0], "energy": [0.0], "stored": 4.5}
-    assert "| mine | lab | no | 5; 5 | - | 1.5; 1.5 | - | 3; 3 | 4.5 | 0; 0 | 0 |" in release_table(
+    assert "| pid | default | no | no | lab | 5; 5 | - | 1.5; 1.5 | - | 3; 3 | 4.5 | 0; 0 | 0 |" in release_table(
         [{**run, "release": [{**piece, "ideal": None}]}]
     )
 

@@ -10,13 +10,13 @@ from baselines.bench.resting import RestingRigs
 from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Complex, declared_by, mass_spring_damper
-from baselines.named import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
@@ -243,18 +243,20 @@ def _line(seed: int, low: float, high: float, period: float, periods: int) -> li
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [
-        ["controller", "sensors", "what the hand does", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]
-    ]
+    head = ["sensors", "what the hand does", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]
+    rows = [["controller", *information.COLUMNS, *head]]
     for row in content["figures"]["rows"]:
         cells = [
             "-" if row[first] is None else "{} [{}, {}]; {}".format(*map(number, row[first : first + 4]))
             for first in (4, 8, 12)
         ]
         push = row[2] if row[2].startswith("one") else f"multisines of {row[2]} at most"
-        rows.append([row[0], row[1], push, row[3], *cells, str(row[-1])])
-    alike = [(*row[1:4], uses_force(row[0])) for row in rows[1:]]
-    return {"bandwidth.md": f"{_stimuli(content)}\n\n{markdown(rows, most=rows[0][4:6], alike=alike)}\n"}
+        model, file = RIGS[row[1]]
+        rig = information.TOLD if row[1] == KNOWN else information.DEFAULT
+        facts = information.informed(row[0], model, rig=rig, parameters=file or "")
+        rows.append([row[0], *facts, row[1], push, row[3], *cells, str(row[-1])])
+    alike = [(row[1], *row[3:7]) for row in rows[1:]]
+    return {"bandwidth.md": f"{_stimuli(content)} {information.LEGEND}\n\n{markdown(rows, most=rows[0][7:9], alike=alike)}\n"}
 
 
 def _stimuli(content: Content) -> str:

@@ -24,6 +24,9 @@ CONDITIONS = {
 }
 """Sensors and plant -> how they look."""
 
+NARROW = 12
+"""So many controllers have a legend that a column takes."""
+
 
 def draw_comparison(figures: Figures, folder: Path) -> list[Path]:
     """Both figures; returns the files written."""
@@ -91,9 +94,8 @@ def air_figure(figures: Figures, folder: Path) -> list[Path]:
     here = [cell for cell in figures if (cell["environment"], cell["plant"]) == (environment, plant)]
     names = controllers_of(figures)
     sensors = list(dict.fromkeys(cell["sensors"] for cell in here))
-    figure, panels = plt.subplots(
-        1, len(sensors), figsize=(COLUMN if len(sensors) < 3 else PAGE, 4.0), layout="constrained", sharey=True, squeeze=False
-    )
+    width = COLUMN if len(sensors) < 3 and len(names) <= NARROW else PAGE
+    figure, panels = plt.subplots(1, len(sensors), figsize=(width, 4.0), layout="constrained", sharey=True, squeeze=False)
     top = _limits(here, "air")[1]
     for axes, kind in zip(panels[0], sensors, strict=True):
         shown = [cell for cell in here if cell["sensors"] == kind]

@@ -5,7 +5,8 @@ import numpy as np
 from agents.policy.files import read_policy
 from agents.policy.seeds import policy_folders
 from baselines.bench.statistics import number
-from baselines.named import resolved, uses_force
+from birthsim_env.registry import entries
+from lab.engine import information
 from lab.engine.tables import markdown
 from lab.studies.comparison.grid import LEARNED, Conditions
 from lab.studies.comparison.privileged import TOLD
@@ -19,15 +20,20 @@ COLUMNS = {
 }
 """Sensors and plant -> the column of their settled errors."""
 
+RIVALS, LEFT_OUT = "baselines.rivals.", ("nonlinear-mpc",)
+"""Where rivals register themselves; the planner has a page of its own."""
+
 CONTROLLERS = (
     "backstepping", f"{TOLD}backstepping", f"{TOLD}backstepping-weight", f"{TOLD}backstepping-frozen",
     "admittance-sensorless", f"{TOLD}admittance-sensorless",
-    "pid", "admittance-backstepping", "admittance-adaptive", f"{TOLD}admittance-adaptive",
+    "backstepping-integral", "backstepping-integral-compliant",
+    "admittance-backstepping", "admittance-adaptive", f"{TOLD}admittance-adaptive",
+    *(one.name for one in entries("controller", listed=True) if one.module.startswith(RIVALS) and one.name not in LEFT_OUT),
     *(f"{LEARNED}{name}" for name in ("circle", "circle_apg", "circle_lab", "circle_lab_apg", "circle_honest_apg")),
     f"{LEARNED}circle_honest_student",
 )  # fmt: skip
-"""The paper's control law as published, told its rig, with its weight compensated, and frozen at rest; its successors without
-and with a force sensor; policies."""
+"""The paper's control law as published, told its rig, with its weight compensated, and frozen at rest; the admittance family
+without and with a force sensor; rivals; policies with the sensors of their training."""
 
 
 def is_shown(name: str, where: Conditions) -> bool:
@@ -42,24 +48,16 @@ def trained_with(policy: str) -> str:
     return str(read_policy(policy_folders(policy)[0]).training.get("sensors", ""))
 
 
-def learns_mass(name: str) -> bool:
-    """Whether a controller, as it runs, learns that the rig is lighter than believed; with sampled positions alone."""
-    if name.startswith(LEARNED):
-        name = read_policy(policy_folders(name.removeprefix(LEARNED))[0]).settings.law
-    plain, options = resolved(name.removeprefix(TOLD))
-    return plain == "admittance" and options.get("learn", True) and options.get("force_sensor", True)
-
-
 def headline(figures: Figures) -> str:
     """A row per controller, with medians and their intervals; in bold the best of those that are told and sense the same."""
     found = {(cell["controller"], cell["sensors"], cell["plant"]): cell for cell in figures}
-    rows = [["controller", "rig", "mass learned", "force sensed", *COLUMNS.values(), "lost or refused"]]
+    rows = [["controller", *information.COLUMNS, *COLUMNS.values(), "lost or refused"]]
     for name in controllers_of(figures):
         own = [found.get((name, *kind)) for kind in COLUMNS]
         errors = ["-" if cell is None else _short(cell["metrics"]["settled_rms"]) for cell in own]
         lost = sum(cell["lost"] for cell in own if cell), sum(cell["episodes"] for cell in own if cell)
-        bare = name.removeprefix(TOLD)
-        facts = ["told" if name.startswith(TOLD) else "default", *map(_yes, (learns_mass(name), uses_force(bare)))]
+        bare, shown = name.removeprefix(TOLD), [sensors for (sensors, _), cell in zip(COLUMNS, own, strict=True) if cell]
+        facts = information.informed(bare, *shown, rig=information.TOLD if name.startswith(TOLD) else information.DEFAULT)
         rows.append(
             [
                 f"`{bare.removeprefix(LEARNED)}`" + ", policy" * name.startswith(LEARNED),
@@ -75,7 +73,3 @@ def _short(found: dict[str, float]) -> str:
     """A median with its interval, whose ends have two digits, so that four of them stand side by side."""
     low, high = ("lost" if np.isinf(found[end]) else f"{found[end]:.2g}" for end in ("low", "high"))
     return f"{number(found['median'])} [{low}, {high}]"
-
-
-def _yes(fact: bool) -> str:
-    return "yes" if fact else "no"

@@ -10,6 +10,7 @@ from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import names, register
+from lab.engine.information import LEGEND
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study, no_pictures
 from lab.engine.worlds import COUNT, SEED, worlds
@@ -134,7 +135,7 @@ def tables(content: Content, name: str) -> dict[str, str]:
     figures, settings = cells_of(content), content["settings"]
     several = len({cell["environment"] for cell in figures}) > 1
     parts = [
-        f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad.",
+        f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad. {LEGEND}",
         overview(figures), *([losses(figures)] if several else []),
         "Every metric, with its interval, its worst episode and its ratio to that of the paper's controller: "
         f"[{name}.csv](data/{name}.csv)",
@@ -153,20 +154,23 @@ def _cuts(content: Content) -> dict[str, str]:
     where = {(CIRCLE, "randomised", sensors) for sensors in COMPARED}
     moving = [cell for cell in figures if (cell["environment"], cell["plant"], cell["sensors"]) in where]
     return tables(content, "comparison") | (
-        {"moving.md": f"{measured_on(content['settings'])}\n\n{overview(moving)}\n"} if moving else {}
+        {"moving.md": f"{measured_on(content['settings'])} {LEGEND}\n\n{overview(moving)}\n"} if moving else {}
     )
 
 
 def _table_of(text: Callable[[Figures], str], name: str, content: Content) -> dict[str, str]:
-    return {f"{name}.md": f"{measured_on(content['settings'])}\n\n{text(cells_of(content))}\n"}
+    return {f"{name}.md": f"{measured_on(content['settings'])} {LEGEND}\n\n{text(cells_of(content))}\n"}
+
+
+def _by_sensors(name: str, content: Content) -> dict[str, str]:
+    return _table_of(partial(by_sensors, parameters=content["settings"]["parameters"]), name, content)
 
 
 def _headline(content: Content) -> dict[str, str]:
     said = (
         "Settled error, mm: median [95 % interval]; a column for each kind of sensors. "
         f"{measured_on(content['settings'])} Rigs are randomised, but for the first column. A lost or refused world counts as "
-        "infinitely bad. *Rig*: the controller believes the default one, or is told each. *Mass learned*: where it is less "
-        "than believed. Policies: five training seeds, with the sensors of their training."
+        f"infinitely bad. {LEGEND} Policies: five training seeds, with the sensors of their training."
     )
     return {"circle.md": f"{said}\n\n{headline(cells_of(content))}\n"}
 
@@ -234,7 +238,7 @@ BOUNDED = comparison(
 )
 HONEST = comparison(
     "honest",
-    partial(_table_of, by_sensors, "honest"),
+    partial(_by_sensors, "honest"),
     env=(CIRCLE, PROBE),
     plant=("randomised", "described-sensors"),
     controller=("admittance-adaptive", "admittance-backstepping", "admittance-sensorless", "backstepping"),
@@ -250,7 +254,7 @@ LIMITED = comparison(
 )
 ACCELERATION = comparison(
     "acceleration",
-    partial(_table_of, by_sensors, "acceleration"),
+    partial(_by_sensors, "acceleration"),
     env=(CIRCLE, PROBE),
     sensors=("lab", "honest"),
     plant=("randomised", "described-sensors"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.bench.statistics import number
-from baselines.named import uses_force
+from lab.engine import information
 from lab.engine.tables import markdown
 from lab.studies.comparison.grid import METRICS, MOVING, RIGS
 
@@ -96,15 +96,16 @@ def overview(figures: Figures) -> str:
     """One row per controller; columns whose environment did not run are left out."""
     found = {(cell["controller"], *_place(cell)): cell for cell in figures}
     columns = [column for column in COLUMNS if any(key[1:] == column.conditions for key in found)]
-    rows = [["controller", *(column.title for column in columns), "lost episodes"]]
+    sensors = list(dict.fromkeys(column.sensors for column in columns))
+    rows = [["controller", *information.COLUMNS, *(column.title for column in columns), "lost episodes"]]
     for name in controllers_of(figures):
-        row = [name]
+        row = [name, *information.informed(name, *sensors)]
         for column in columns:
             cell = found.get((name, *column.conditions))
             row.append("-" if cell is None else column.text(cell))
         own = [cell for cell in figures if cell["controller"] == name]
         rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}"])
-    return markdown(rows, [column.title for column in columns], alike=[uses_force(row[0]) for row in rows[1:]])
+    return markdown(rows, [column.title for column in columns], alike=[(row[1], row[3]) for row in rows[1:]])
 
 
 def losses(figures: Figures) -> str:
@@ -128,14 +129,15 @@ def settled(figures: Figures) -> str:
     found = {(cell["controller"], (cell["environment"], cell["sensors"])): cell for cell in figures}
     names = controllers_of(figures)
     lost_of = "" if several else f", {' and '.join(sensors for _, sensors in kinds)}"
-    rows = [["controller", "uses the hand's force", *titles, f"lost{lost_of}"]]
+    rows = [["controller", *information.COLUMNS, *titles, f"lost{lost_of}"]]
     for name in names:
         own = [found[name, kind] for kind in kinds]
         errors = [[cell["metrics"]["settled_rms"][key] for key in ("median", "q95")] for cell in own]
         cells = ["; ".join(map(number, error)) for error in errors]
         lost = " and ".join(str(cell["lost"]) for cell in own)
-        rows.append([f"`{name}`", "yes" if uses_force(name) else "no", *cells, f"{lost} of {own[0]['episodes']}"])
-    return markdown(rows, titles, alike=[row[1] for row in rows[1:]])
+        facts = information.informed(name, *(sensors for _, sensors in kinds))
+        rows.append([f"`{name}`", *facts, *cells, f"{lost} of {own[0]['episodes']}"])
+    return markdown(rows, titles, alike=[(row[1], row[3]) for row in rows[1:]])
 
 
 def _short(environment: str) -> str:
@@ -150,13 +152,12 @@ KINDS = {
 """Sensors and plant -> what the table of sensors calls them, on randomised rigs."""
 
 
-def by_sensors(figures: Figures) -> str:
-    """What sensors cost on randomised rigs: median, 95 % and worst per controller and ``KINDS``, a column per hand."""
+def by_sensors(figures: Figures, parameters: str = "") -> str:
+    """What sensors cost on randomised rigs: median, 95 % and worst per controller and ``KINDS``, a column per hand; controllers
+    believe the rig of a file, ``parameters``."""
     found = {(cell["controller"], *_place(cell)): cell for cell in figures}
-    rows = [[
-        "controller", "sensors", "Probe: stiffness error, %", "hunting, mm", "settled error, mm", "Circle: settled error, mm",
-        *(f"Circle, {hand} hand" for hand in MOVING), "lost",
-    ]]  # fmt: skip
+    head = ["sensors", "Probe: stiffness error, %", "hunting, mm", "settled error, mm", "Circle: settled error, mm"]
+    rows = [["controller", *information.COLUMNS, *head, *(f"Circle, {hand} hand" for hand in MOVING), "lost"]]
     columns = [(PROBE, "", metric) for metric in ("stiffness_error", "hunting", "settled_rms")]
     columns += [(CIRCLE, hand, "settled_rms") for hand in ("", *MOVING)]
     for name in controllers_of(figures):
@@ -168,8 +169,9 @@ def by_sensors(figures: Figures) -> str:
                     ", ".join(number(cell["metrics"][metric][key]) for key in ("median", "q95", "worst"))
                     for cell, metric in own
                 ]
-                rows.append([name, words, *three, str(sum(cell["lost"] for cell, _ in own[2:]))])
-    return markdown(rows, rows[0][2:-1], alike=[(row[1], uses_force(row[0])) for row in rows[1:]])
+                facts = information.informed(name, kind[0], parameters=parameters)
+                rows.append([name, *facts, words, *three, str(sum(cell["lost"] for cell, _ in own[2:]))])
+    return markdown(rows, rows[0][5:-1], alike=[(row[4], row[1], row[3]) for row in rows[1:]])
 
 
 def data(figures: Figures) -> str:

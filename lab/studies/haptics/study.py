@@ -43,7 +43,7 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content, name: str) -> dict[str, str]:
-    return {f"{name}.md": report(content["figures"])}
+    return {f"{name}.md": report(content["figures"], content["settings"]["parameters"])}
 
 
 def _pictures(content: Content, folder: Path) -> list[Path]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from baselines.bench.statistics import number, quantile
 from birthsim_env.physics.compiled.lanes import Array
+from lab.engine import information
 from lab.engine.tables import markdown
 from lab.studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
 from lab.studies.haptics.kept import PEAK
@@ -16,9 +17,10 @@ Runs = Sequence[dict[str, Any]]
 """What ``lab.studies.haptics.kept.kept`` gives, in the order of the rows."""
 
 
-def report(runs: Runs) -> str:
-    """All tables for the subjects that were measured."""
-    parts = [rendering_table(runs), release_table(runs), backdriving_table(runs), stability_table(runs)]
+def report(runs: Runs, parameters: str = "") -> str:
+    """All tables for the subjects that were measured; controllers believe the rig of a file, ``parameters``."""
+    tables = rendering_table, release_table, backdriving_table, stability_table
+    parts = [table(runs, parameters) for table in tables]
     return "\n\n".join([heading(runs), *(part for part in parts if part)]) + "\n"
 
 
@@ -27,10 +29,11 @@ def heading(runs: Runs) -> str:
     first = runs[0]
     randomised = f"{first['rigs']} randomised rigs, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
     rigs = randomised if first["rigs"] else "the rig as the controllers believe it"
-    return f"{rigs[0].upper()}{rigs[1:]}. Two numbers in a cell are the median and the worst over poses, directions and rigs."
+    cells = "Two numbers in a cell are the median and the worst over poses, directions and rigs."
+    return f"{rigs[0].upper()}{rigs[1:]}. {cells} {information.LEGEND}"
 
 
-def rendering_table(runs: Runs) -> str:
+def rendering_table(runs: Runs, parameters: str = "") -> str:
     """Impedance, errors, energy, air and saturation at ``PEAK``; medians over lanes, with the worst behind a semicolon."""
     rows = []
     for run in runs:
@@ -39,7 +42,7 @@ def rendering_table(runs: Runs) -> str:
             lost = np.array(piece["lost"], dtype=bool)[kept]
             rows.append(
                 [
-                    *_who(run),
+                    *_who(run, parameters),
                     f"{piece['stiffness']:g}",
                     *(
                         _pair(piece, name, kept, lost, least=True)
@@ -53,10 +56,11 @@ def rendering_table(runs: Runs) -> str:
         *WHO, "N/m", "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
         "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %", "lost",
     )  # fmt: skip
-    return _table(f"### Impedance under multisines of {PEAK:g} N", columns, rows, columns[7:-1], columns[4:7])
+    own = columns[len(WHO) + 1 : -1]
+    return _table(f"### Impedance under multisines of {PEAK:g} N", columns, rows, own[3:], own[:3])
 
 
-def release_table(runs: Runs) -> str:
+def release_table(runs: Runs, parameters: str = "") -> str:
     """Overshoot, speed and energy of a pull that is let go, beside the declared impedance's."""
     rows = []
     for run in runs:
@@ -70,7 +74,7 @@ def release_table(runs: Runs) -> str:
             energy = _spread(np.where(lost, np.inf, _numbers(piece["energy"])))
             rows.append(
                 [
-                    *_who(run),
+                    *_who(run, parameters),
                     own["overshoot_mm"],
                     wanted["overshoot_mm"],
                     own["speed"],
@@ -88,19 +92,19 @@ def release_table(runs: Runs) -> str:
     return _table(f"### A pull of {PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m", columns, rows, LEAST)
 
 
-def backdriving_table(runs: Runs) -> str:
+def backdriving_table(runs: Runs, parameters: str = "") -> str:
     """Mean and largest force beyond ``K x``, over poses and directions, at each setpoint."""
     stiffnesses = list(dict.fromkeys(piece["stiffness"] for run in runs for piece in run.get("backdriving", ())))
     rows = []
     for run in runs:
         found = {piece["stiffness"]: piece for piece in run.get("backdriving", ())}
         if found:
-            rows.append([*_who(run), *(_beyond(found[stiffness]) for stiffness in stiffnesses)])
+            rows.append([*_who(run, parameters), *(_beyond(found[stiffness]) for stiffness in stiffnesses)])
     columns = (*WHO, *(f"at {value:g} N/m" for value in stiffnesses))
-    return _table("### Force beyond K x at 10 mm/s, N (median of the means; largest)", columns, rows, columns[3:])
+    return _table("### Force beyond K x at 10 mm/s, N (median of the means; largest)", columns, rows, columns[len(WHO) :])
 
 
-def stability_table(runs: Runs) -> str:
+def stability_table(runs: Runs, parameters: str = "") -> str:
     """Hands with which the law rests, the largest of motion, force (peak to peak) and energy, and the stiffest setpoint that is
     stable against all of ``HANDS``."""
     rows = []
@@ -115,7 +119,7 @@ def stability_table(runs: Runs) -> str:
                 cells.append(number(float(np.where(np.isfinite(values), values, np.inf).max())))
         for piece in run.get("z_width", ()):
             cells += list(_z_width(piece))
-        rows.append([*_who(run), *cells])
+        rows.append([*_who(run, parameters), *cells])
     held = next((run["hands"] for run in runs if "hands" in run), ())
     columns = [*WHO]
     for piece in held:
@@ -133,11 +137,13 @@ UNDER_MULTISINES = ("noticed", "error_own_mm", "error_spring_mm", "energy", "sho
 LEAST = ("overshoot, mm", "peak speed, m/s", "kinetic energy, J", "energy given, J")
 """Of a release."""
 
-WHO = ("controller", "sensors", "uses the hand's force")
+WHO = ("controller", *information.COLUMNS, "sensors")
 
 
-def _who(run: dict[str, Any]) -> list[str]:
-    return [run["controller"], run["sensors"], "yes" if run["uses_force"] else "no"]
+def _who(run: dict[str, Any], parameters: str) -> list[str]:
+    """Of the hand's force counts what was measured: a run may hide it."""
+    *facts, _ = information.informed(run["controller"], run["sensors"], parameters=parameters)
+    return [run["controller"], *facts, "yes" if run["uses_force"] else "no", run["sensors"]]
 
 
 def _numbers(values: Any) -> Array:
@@ -176,6 +182,6 @@ def _z_width(piece: dict[str, Any]) -> tuple[str, str]:
 def _table(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], least: Sequence[str], most: Sequence[str] = ()
 ) -> str:
-    """Of the same sensors and told the same; impedances of the same setpoint, which is the fourth column there."""
-    told = 4 if "N/m" in columns else 3
-    return f"{title}\n\n{markdown([columns, *rows], least, most, [row[1:told] for row in map(tuple, rows)])}" if rows else ""
+    """Of the same sensors and told the same; impedances of the same setpoint, which follows there."""
+    alike = [(row[1], *row[3 : len(WHO) + ("N/m" in columns)]) for row in map(tuple, rows)]
+    return f"{title}\n\n{markdown([columns, *rows], least, most, alike)}" if rows else ""

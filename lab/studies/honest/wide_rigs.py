@@ -18,6 +18,7 @@ from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import carried
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -113,15 +114,16 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     titles = [f"{scenario}: {metric.split('_')[0]}, mm; beyond {most:g} mm" for scenario, (metric, most) in METRICS.items()]
-    rows = [["controller", "believes", *titles, "stiffness error, %"]]
+    rows = [["controller", *information.COLUMNS, *titles, "stiffness error, %"]]
     for own in content["figures"]:
         shown = {key: cells([own[key][share] for share in ("median", "q95", "worst")]) for key in (*METRICS, "stiffness_error")}
         beyond = [f"{shown[key]}; {own[key]['beyond']} of {own[key]['of']}" for key in METRICS]
-        believes = f"its rig to {100 * OFF:g} %" if own["known"] else "the default rig"
-        rows.append([f"`{own['controller']}`", believes, *beyond, shown["stiffness_error"]])
+        rig = f"{information.TOLD} to {100 * OFF:g} %" if own["known"] else information.DEFAULT
+        facts = information.informed(own["controller"], "honest", rig=rig)
+        rows.append([f"`{own['controller']}`", *facts, *beyond, shown["stiffness_error"]])
     drawn = worlds(content["settings"]["seed"], content["settings"]["episodes"])
     said = f"{drawn}, of which those count that ask for at most {100 * STRENGTH:g} % of the rig's strength."
-    table = markdown(rows, rows[0][2:], alike=[row[1] for row in rows[1:]])
+    table = markdown(rows, rows[0][4:], alike=[row[1] for row in rows[1:]])
     return {"wide_rigs.md": f"{said}\n\n{table}\n"}
 
 

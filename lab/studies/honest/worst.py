@@ -9,7 +9,7 @@ import numpy as np
 from baselines.bench.evaluation import Evaluation, evaluate_worlds
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
-from baselines.named import make_controller, uses_force
+from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
@@ -21,6 +21,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, load_parameters, value_of
 from birthsim_env.physics.rig.values import checked_number
 from birthsim_env.registry import names, register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
@@ -114,13 +115,14 @@ def causes(
 def _shown(content: Content) -> dict[str, str]:
     settings, metric = content["settings"], content["settings"]["metric"]
     named = f"{metric}, {UNITS[metric]}"
-    head = ["controller", "sensors"]
+    head = ["controller", *information.COLUMNS, "sensors"]
     rows = [[*head, named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
     names = list(content["figures"][0]["found"]["figures"])
     worlds = [[*head, "found in world", "push, N", "mm asked for", "% of the strength", *names]]
     changed = [[*head, "parameter", "of the world found", "put to", named]]
     for row in content["figures"]:
-        own, found = [row["controller"], row["sensors"]], row["found"]
+        facts = information.informed(row["controller"], row["sensors"], parameters=settings["parameters"])
+        own, found = [row["controller"], *facts, row["sensors"]], row["found"]
         sizes = [", ".join(map(_number, row[name])) for name in (metric, "unrest")]
         listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in row["named"])
         rows.append([*own, sizes[0], str(row["above"]), sizes[1], str(row["lost"]), listed, _number(found["size"])])
@@ -133,8 +135,8 @@ def _shown(content: Content) -> dict[str, str]:
         f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst. The last column has "
         f"what {settings['episodes']} further episodes found by moving the rigs of the worst worlds within their ranges."
     )
-    alike = [(row[1], uses_force(row[0])) for row in rows[1:]]
-    tables = [markdown(rows, rows[0][2:6], alike=alike), markdown(worlds), markdown(changed)]
+    alike = [(row[4], row[1], row[3]) for row in rows[1:]]
+    tables = [markdown(rows, rows[0][5:9], alike=alike), markdown(worlds), markdown(changed)]
     return {"worst.md": "\n\n".join([text, *tables]) + "\n"}
 
 

@@ -12,11 +12,11 @@ from agents.policy.seeds import as_table, policy_folders, seed_metrics
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
 from baselines.bench.statistics import jsonable
-from baselines.named import uses_force
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -146,7 +146,7 @@ def _summary(figures: dict[str, Any]) -> str:
 def _beside(figures: dict[str, Any]) -> str:
     """Policies beside classical controllers."""
     settled, *others = [name for name, _ in COMPARED.values()]
-    rows = [["world, sensors", "controller", settled, *felt.COLUMNS.values(), *others, "lost"]]
+    rows = [["world, sensors", "controller", *information.COLUMNS, settled, *felt.COLUMNS.values(), *others, "lost"]]
     alike = []
     for policy, found in figures.items():
         every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
@@ -157,9 +157,10 @@ def _beside(figures: dict[str, Any]) -> str:
             learned = controller.startswith("residual")
             name = controller.replace("residual", policy) if learned else controller
             of, _, lost, *_ = own["lost episodes"]
-            rows.append([world, name, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
-            alike.append((policy, uses_force(f"residual:{policy}" if learned else controller)))
-    return f"{_worlds(figures)}\n\n{markdown(rows, rows[0][2:-1], alike=alike)}\n"
+            facts = information.informed(f"residual:{policy}" if learned else controller, RUNS[policy].sensors)
+            rows.append([world, name, *facts, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
+            alike.append((policy, facts[0], facts[2]))
+    return f"{_worlds(figures)} {information.LEGEND}\n\n{markdown(rows, rows[0][5:-1], alike=alike)}\n"
 
 
 def _worlds(policies: Iterable[str]) -> str:

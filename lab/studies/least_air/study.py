@@ -12,6 +12,7 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
@@ -68,16 +69,15 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [[
-        "scenario", "controller", "sensors", "air, l/min", "with least air", "saved, %", "settled error, mm", "with least air",
-        "lost",
-    ]]  # fmt: skip
+    head = ["sensors", "air, l/min", "with least air", "saved, %", "settled error, mm", "with least air", "lost"]
+    rows = [["scenario", "controller", *information.COLUMNS, *head]]
     for row in content["figures"]:
         median, low, high = row["saved"]
         rows.append(
             [
                 row["scenario"],
                 f"`{row['controller']}`",
+                *information.informed(row["controller"], row["sensors"]),
                 row["sensors"],
                 *map(number, row["air"]),
                 f"{median:.1f} ({low:.1f} to {high:.1f})",

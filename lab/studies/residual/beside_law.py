@@ -23,6 +23,7 @@ from birthsim_env.files import finite
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import names, register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
@@ -211,29 +212,42 @@ def _mean(values: Array) -> float:
 
 def _shown(content: Content) -> dict[str, str]:
     figures, settings = content["figures"], content["settings"]
-    head = ["controller", f"{ERRORS['error']}: median", "95 %", "less: median of the pairs, mm", "mean, mm"]
-    rows = [[*head, f"{ERRORS['stiffness']}: median", *STATIC, "lost"]]
+    head = [f"{ERRORS['error']}: median", "95 %", "less: median of the pairs, mm", "mean, mm"]
+    rows = [["controller", *information.COLUMNS, *head, f"{ERRORS['stiffness']}: median", *STATIC, "lost"]]
     for row in figures["errors"]:
         less = [_entry((row["less"] or {}).get(key)) for key in ("median", "mean")]
         error, static = (map(_entry, row[name] or ("", "")) for name in ("error", "static"))
-        rows.append([row["who"], *error, *less, _entry(row["stiffness"]), *static, _entry(row["lost"])])
+        compared = [*error, *less, _entry(row["stiffness"]), *static, _entry(row["lost"])]
+        rows.append([row["who"], *_told(row["who"], settings), *compared])
     parts = [
         f"{worlds(settings['seed'], settings['episodes'])}, `{settings['sensors']}` sensors, randomised rigs; "
         f"{figures['within']} are within the rig's strength. Differences compare the same worlds, with 95 % intervals. "
         f"The static stiffness is that of a held push in as many worlds of `{PUSHED}`.",
-        markdown(rows, [head[1], "95 %", rows[0][5], *STATIC]),
+        markdown(rows, [*head[:2], rows[0][8], *STATIC]),
     ]
     if figures["felt"]:
-        rows = [["controller", *FELT.values(), *MORE.values(), "lost"]]
+        rows = [["controller", *information.COLUMNS, *FELT.values(), *MORE.values(), "lost"]]
         for row in figures["felt"]:
             better = [_entry((row["better"] or {}).get(key)) for key in MORE]
-            rows.append([row["who"], *(_entry(row[key]) for key in FELT), *better, _entry(row["lost"])])
+            felt = [*(_entry(row[key]) for key in FELT), *better, _entry(row["lost"])]
+            rows.append([row["who"], *_told(row["who"], settings), *felt])
         parts += [
             f"What a hand feels: multisines of {PUSH:g} N at {SETPOINT:g} N/m on {settings['rigs']} randomised rigs, means "
             "over three poses and two directions.",
             markdown(rows),
         ]
     return {"beside-law.md": "\n\n".join(parts) + "\n"}
+
+
+def _told(who: str, settings: dict[str, Any]) -> list[str]:
+    """The information of a row, which a controller, a policy or one of its seeds has; empty for differences."""
+    name = who.partition(" ")[0]
+    if name.startswith("seed_"):
+        name = Path(settings["policy"]).name
+    if name == "all":
+        return [""] * len(information.COLUMNS)
+    policies = [one for one in (settings["policy"], *settings["beside"]) if Path(one).name == name and one not in LAWS]
+    return information.informed(f"residual:{policies[0]}" if policies else name, settings["sensors"])
 
 
 def _entry(value: Any) -> str:

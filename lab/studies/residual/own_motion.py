@@ -20,6 +20,7 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
@@ -118,18 +119,29 @@ def _mean(values: Array) -> float:
 
 def _shown(content: Content) -> dict[str, str]:
     settings, figures = content["settings"], content["figures"]
-    rows = [["hand", "controller", "from its declared motion, mm", "less than the controller: mean, mm", "lost"]]
+    head = ["from its declared motion, mm", "less than the controller: mean, mm", "lost"]
+    rows = [["hand", "controller", *information.COLUMNS, *head]]
     for row in figures["moving"]:
         less = "" if row["less"] is None else "{} ({} to {})".format(*map(number, row["less"]))
-        rows.append([row["hand"], row["who"], " / ".join(map(number, row["error"])), less, str(row["lost"])])
-    static = [["controller", "static stiffness error, %"]]
-    static += [[name, " / ".join(map(number, sizes))] for name, sizes in figures["static"].items()]
-    head = (
+        error = " / ".join(map(number, row["error"]))
+        rows.append([row["hand"], row["who"], *_told(row["who"], settings), error, less, str(row["lost"])])
+    static = [["controller", *information.COLUMNS, "static stiffness error, %"]]
+    static += [[name, *_told(name, settings), " / ".join(map(number, sizes))] for name, sizes in figures["static"].items()]
+    said = (
         f"{worlds(settings['seed'], settings['episodes'])}, `{settings['sensors']}` sensors, randomised rigs, those "
         f"within the rig's strength. Differences compare the same worlds, with 95 % intervals. Below: `{STATIC}`."
     )
-    moving = markdown(rows, rows[0][2:3], alike=[(hand, who in BOUNDS) for hand, who, *_ in rows[1:]])
-    return {"own-motion.md": "\n\n".join([head, moving, markdown(static, static[0])]) + "\n"}
+    moving = markdown(rows, rows[0][5:6], alike=[(hand, who in BOUNDS) for hand, who, *_ in rows[1:]])
+    return {"own-motion.md": "\n\n".join([said, moving, markdown(static, static[0][4:])]) + "\n"}
+
+
+def _told(who: str, settings: dict[str, Any]) -> list[str]:
+    """The information of a controller, of a policy or one of its seeds; that of a bound is no controller's."""
+    if who in BOUNDS:
+        return ["-"] * len(information.COLUMNS)
+    policy = settings["policy"]
+    learned = who.startswith("seed_") or who.partition(",")[0] == policy
+    return information.informed(f"residual:{policy}" if learned else who, settings["sensors"])
 
 
 STUDY = Study(

@@ -19,7 +19,7 @@ from birthsim_env.scores import RIGS, ROLES, SENSORS
 from lab.engine.results import Content, written
 from lab.engine.study import Found, Options, Study
 from lab.studies.comparison.grid import ENVIRONMENTS, default_controllers
-from lab.studies.scores.tables import Scored, data, overview
+from lab.studies.scores.tables import Scored, data, informed, overview
 
 REFERENCE = "reference_scores.json"
 """What stands in ``birthsim_env/scores.json``."""
@@ -109,7 +109,7 @@ def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
     def best(names: Iterable[str]) -> str:
         return max(names, key=lambda name: float(rows[name]["halves"][0]))
 
-    laws = default_controllers()
+    laws = [name for name in default_controllers() if name in rows]
     learned = [name for name in rows if name not in laws and name not in uncontrolled_names()]
     chosen = ("shut-valves", "random-valves", "backstepping", best(laws), *([best(learned)] if learned else []))
     return {
@@ -134,7 +134,7 @@ def _shown(content: Content) -> dict[str, str]:
         scores.setdefault(one.scenario, {}).setdefault(one.sensors, {})[one.rig] = one.roles
     own = {name: content[name] for name in ("command", "commit", "date", "settings")}
     linked = "Every controller, with its returns: [scores.csv](data/scores.csv)"
-    text = "\n\n".join((_CAPTION.format(**content["settings"]), overview(found), linked))
+    text = "\n\n".join((_CAPTION.format(**content["settings"]), overview(found), informed(found), linked))
     return {"scores.md": text + "\n", "scores.csv": data(found), REFERENCE: written({**own, "scores": scores})}
 
 

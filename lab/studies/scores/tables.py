@@ -8,7 +8,9 @@ from typing import Any
 
 from baselines.bench.measures import DISCOUNTS
 from baselines.bench.statistics import number
+from baselines.named import uncontrolled_names
 from birthsim_env.scores import BEST, ROLES, SHUT
+from lab.engine import information
 from lab.engine.tables import markdown
 
 DATA = (
@@ -53,6 +55,20 @@ def overview(found: Sequence[Scored]) -> str:
             name = one.roles[role]["controller"]
             row.append(f"{one.score(name)}, {name}" if role.startswith("best") else str(one.score(name)))
         rows.append(row)
+    return markdown(rows)
+
+
+def informed(found: Sequence[Scored]) -> str:
+    """What each controller and policy of the ``overview`` is told and senses."""
+    rows = [["controller", *information.COLUMNS]]
+    sensors: dict[str, list[str]] = {}
+    for one in found:
+        for own in one.roles.values():
+            policy, _, seed = own["controller"].partition(" ")
+            sensors.setdefault(f"residual:{policy}" if seed else policy, []).append(one.sensors)
+    for name, kinds in sensors.items():
+        if name not in uncontrolled_names():
+            rows.append([name, *information.informed(name, *kinds)])
     return markdown(rows)
 
 

@@ -13,6 +13,7 @@ from birthsim_env.parts.scenarios import studied_scenarios
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -27,6 +28,9 @@ RIGS = {
     "force": ("admittance-adaptive", None),
 }
 """Sensors besides positions and pressures -> the controller that makes the best of them, and its rig."""
+
+TOLD = {"nominal": information.TOLD, "randomised": information.DEFAULT}
+"""What each of ``PLANTS`` makes of the rig that controllers believe."""
 
 LANES = 64
 """Worlds of a piece."""
@@ -71,15 +75,17 @@ def kept(plants: Iterable[str], found: Found) -> Any:
 
 def tables(figures: Any, settings: dict[str, Any]) -> str:
     """What a hand feels, and errors by scenario, in the worlds of a result's ``settings``."""
-    found = [f"{worlds(settings['seed'], settings['episodes'])}, of every scenario."]
+    found = [f"{worlds(settings['seed'], settings['episodes'])}, of every scenario. {information.LEGEND}"]
     for names, titles in (
         (COLUMNS, list(COLUMNS.values())),
         (studied_scenarios(), [f"{name}: settled error, mm" for name in studied_scenarios()]),
     ):
-        rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
+        rows = [["force or acceleration sensor", "controller", *information.COLUMNS, *titles, "lost"]]
         for row in figures:
             shown = [cells(row["figures"][name][:2]) for name in names]
-            rows.append([row["rig"], row["plant"], *shown, f"{row['lost']} of {row['of']}"])
+            controller, file = RIGS[row["rig"]]
+            facts = information.informed(controller, "honest", rig=TOLD.get(row["plant"], row["plant"]), parameters=file or "")
+            rows.append([row["rig"], f"`{controller}`", *facts, *shown, f"{row['lost']} of {row['of']}"])
         found.append(markdown(rows))
     return "\n\n".join(found) + "\n"
 

@@ -12,6 +12,7 @@ from typing import Any
 from baselines.backstepping.stiffest import PART
 from baselines.work.tasks import Task
 from birthsim_env.registry import register
+from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
@@ -35,12 +36,16 @@ def _kept(_: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    head = [f"{name}, {unit}" if unit else name for name, unit in UNITS.items()]
-    return {"stiffest.md": markdown([head, *([_entry(value) for value in row] for row in content["figures"])]) + "\n"}
+    first, *head = [f"{name}, {unit}" if unit else name for name, unit in UNITS.items()]
+    rows = [[first, *information.COLUMNS, *head]]
+    for name, *values in content["figures"]:
+        facts = information.informed(name, "lab", rig=information.TOLD)
+        rows.append([name, *facts, *map(_entry, values)])
+    return {"stiffest.md": markdown(rows) + "\n"}
 
 
 def _entry(value: Any) -> str:
-    return "-" if value is None else value if isinstance(value, str) else f"{value:.4g}"
+    return "-" if value is None else f"{value:.4g}"
 
 
 STUDY = Study({}, _tasks, _kept, UNITS, _shown)

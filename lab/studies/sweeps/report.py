@@ -10,6 +10,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.work.tasks import Result
 from birthsim_env.extras import installation
+from lab.engine import information
 from lab.engine.tables import markdown
 from lab.studies.sweeps.plan import Point
 
@@ -79,13 +80,21 @@ def figures(points: Sequence[Point], results: Sequence[Sequence[Result]]) -> lis
     return found
 
 
-def table(found: Sequence[dict[str, Any]]) -> str:
-    """Markdown of ``figures`` as a result keeps them: what varies, lost episodes, settled error, successes and mean return."""
+def table(found: Sequence[dict[str, Any]], sensors: str = "ideal") -> str:
+    """Markdown of ``figures`` as a result keeps them: what varies, lost episodes, settled error, successes and mean return.
+
+    Where controllers vary, what each is told and senses stands behind it; ``sensors`` are those of points that name none.
+    """
     names = list(dict.fromkeys(name for row in found for name in row["point"]))
-    head = [*names, "lost", "settled error, mm: median", "95 %", "largest", "success", "return, mean"]
-    rows = [head]
+    head = [one for name in names for one in (name, *(information.COLUMNS if name == "controller" else ()))]
+    rows = [[*head, "lost", "settled error, mm: median", "95 %", "largest", "success", "return, mean"]]
     for row in found[:SHOWN_POINTS]:
-        varied = [short(row["point"].get(name)) for name in names]
+        point = row["point"]
+        varied = []
+        for name in names:
+            varied.append(short(point.get(name)))
+            if name == "controller":
+                varied += information.informed_if_registered(point[name], point.get("sensors", sensors))
         error = [number(as_float(row["metrics"]["settled_rms"][key])) for key in ("median", "q95", "max")]
         count = row["episodes"]
         rows.append(

@@ -52,7 +52,7 @@ def _shown(content: Content) -> dict[str, str]:
     base = ", ".join(f"{name} = {value}" for name, value in found["base"].items() if value is not None)
     caption = f"{len(found['points'])} points; {base}. A lost episode counts as infinitely bad."
     best = [f"The best of the trials: {found['best']}."] if found["best"] else []
-    return {"sweep.md": "\n\n".join([caption, *best, table(found["points"])]) + "\n"}
+    return {"sweep.md": "\n\n".join([caption, *best, table(found["points"], found["base"]["sensors"])]) + "\n"}
 
 
 def _drawn(content: Content, folder: Path) -> list[Path]:
