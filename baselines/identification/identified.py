@@ -142,13 +142,7 @@ class Identified:
     def _forms(self) -> str:
         """What may be of another form, by the signal that fits worse."""
         if self.misfit[1] > self.misfit[0]:
-            tried = self.laws.chances
-            other = (
-                f"friction of a law that the model lacks (none of {', '.join(tried)} fits)"
-                if tried
-                else "another law of friction"
-            )
-            return f"{other}, friction along the stroke, a bore or a lever measured wrong"
+            return f"{self.laws.others()}, friction along the stroke, a bore or a lever measured wrong"
         return "leaks, spools of second order, commands that are late, a curve of the valves or a tube that it does not know"
 
     def _encoders(self) -> list[str]:

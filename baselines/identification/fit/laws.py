@@ -24,7 +24,6 @@ from baselines.identification.fit.estimate import MOST_WEIGHTS, Fit, begin, refi
 from baselines.identification.fit.free_parameters import FreeParameter, coordinates
 from baselines.identification.fit.problem import Problem, Tick
 from baselines.identification.log.trial import Trial
-from baselines.identification.windows.noise import guessed_noise
 from baselines.identification.windows.windows import cut
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
@@ -35,7 +34,9 @@ LAWS: tuple[str, ...] = DECLARED[LAW].choices
 """The laws that the plant knows."""
 
 SLOW = ("gms",)
-"""Laws that take some ten times as long as others: tried, by one evaluation, where no other law fits; the owner's always."""
+"""Laws whose searches take some ten times as long as others': fitted where the owner's rig has one, or where asked for."""
+
+COMPARED = tuple(law for law in LAWS if law not in SLOW)
 
 EVALUATIONS, MORE = 3, 6
 """Evaluations of a law's search before laws are compared, and further ones of those that these do not tell apart; assumed."""
@@ -68,7 +69,7 @@ class Laws:
     def words(self) -> list[str]:
         """The law, and how sure it is, in a line."""
         if not self.chances:
-            return [f"{LAW} = {self.chosen}, as asked for: no other law was tried"]
+            return [f"{LAW} = {self.chosen}, as given: no other law was tried"]
         worse = [law for law in self.chances if law != self.chosen and law not in self.rivals]
         behind = f"{_listed(worse)} {'predicts' if len(worse) == 1 else 'predict'} windows that guided no fit worse"
         chance = self.chances[self.chosen]
@@ -77,7 +78,14 @@ class Laws:
             return [f"{LAW} = {self.chosen}, probability {sure}: {behind} ({self.windows} windows); was {self.owner}"]
         told = ", ".join(f"{law} {self.chances[law]:.2f}" for law in (self.chosen, *self.rivals))
         how = "KEPT" if self.chosen == self.owner else f"the likeliest; was {self.owner}"
-        return [f"{LAW} = {self.chosen}, {how}: the log cannot tell {told}{f'; {behind}' if worse else ''}"]
+        return [f"{LAW} = {self.chosen}, {how}: the log cannot tell {told} apart{f'; {behind}' if worse else ''}"]
+
+    def others(self) -> str:
+        """Which friction a rig may have that the chosen law does not fit."""
+        if not self.chances:
+            return "another law of friction"
+        untried = ", ".join(f"--friction-law {law}" for law in SLOW)
+        return f"another law of friction (none of {_listed(list(self.chances))} fits; not tried: {untried})"
 
 
 def _listed(names: list[str]) -> str:
@@ -103,8 +111,7 @@ class _Compared:
             windows = replace(windows, pressure_weights=given.pressure_weights, position_weights=given.position_weights)
         problem = Problem(windows, first.noise, self._owner.replace({LAW: law}), start.free, self._tick)
         begun = start.rig.replace({LAW: law})
-        most = 1 if law in SLOW else EVALUATIONS
-        self._search(law, problem, coordinates(begun, start.free), most, weights, (begun, start.problem.offsets.sizes))
+        self._search(law, problem, coordinates(begun, start.free), EVALUATIONS, weights, (begun, start.problem.offsets.sizes))
 
     def go_on(self, law: str) -> None:
         """Search on under a law that is there."""
@@ -151,41 +158,28 @@ def chances_of(scores: Array, seed: int) -> Array:
 def fit_law(
     trial: Trial, owner: Parameters, seed: int, free: tuple[FreeParameter, ...], tick: Tick, law: str | None = None
 ) -> tuple[Fit, Laws]:
-    """The parameters of a trial's rig under the friction law that the trial supports best, or under ``law``.
+    """The parameters of a trial's rig under the friction law that the trial supports best, or under ``law``; a rig whose owner
+    has a law of ``SLOW`` is fitted under that.
 
     The owner's law is kept where the trial does not tell that it is another one. All laws begin where the first evaluations
     under the owner's lead, and only the chosen one is searched to its end. Comparing has a budget as large as the search's.
     """
     known = value_of(owner, LAW)
-    if law is not None:
-        asked = owner.replace({LAW: law})
-        return refine(trial, begin(trial, asked, seed, free, tick), asked, free, tick), Laws(known, law, {}, 0)
+    if law or known in SLOW:
+        asked = owner.replace({LAW: law or known})
+        return refine(trial, begin(trial, asked, seed, free, tick), asked, free, tick), Laws(known, law or known, {}, 0)
     first = begin(trial, owner, seed, free, tick)
     first.problem.windows.budget.left += Budget.of(trial).left
     compared = _Compared(trial, first, owner, tick)
     compared.add(known, first, MOST_WEIGHTS)
-    for other in LAWS:
-        if other != known and other not in SLOW:
+    for other in COMPARED:
+        if other != known:
             compared.add(other, compared.fits.get(known, first))
     if not compared.fits:
         raise compared.failed[0]
     laws = _told(compared, known, seed)
-    found = _refined(trial, compared, laws, owner, tick)
-    if not found.is_good(guessed_noise(trial)) and not found.problem.windows.budget.over:
-        if laws.chosen not in SLOW:
-            compared.go_on(laws.chosen)
-        for other in SLOW:
-            if other not in compared.fits:
-                compared.add(other, compared.fits[laws.chosen])
-        before, laws = laws, _told(compared, known, seed)
-        if laws.chosen != before.chosen:
-            found = _refined(trial, compared, laws, owner, tick)
-    return found, laws
-
-
-def _refined(trial: Trial, compared: _Compared, laws: Laws, owner: Parameters, tick: Tick) -> Fit:
     begun = compared.fits[laws.chosen]
-    return refine(trial, begun, owner.replace({LAW: laws.chosen}), begun.free, tick)
+    return refine(trial, begun, owner.replace({LAW: laws.chosen}), free, tick), laws
 
 
 def _told(compared: _Compared, known: str, seed: int) -> Laws:
@@ -194,8 +188,7 @@ def _told(compared: _Compared, known: str, seed: int) -> Laws:
     near = [law for law, chance in chances.items() if chance > 1.0 - SURE]
     if len(near) > 1:
         for law in near:
-            if law not in SLOW:
-                compared.go_on(law)
+            compared.go_on(law)
         chances = compared.chances(seed)
     chosen = known if chances.get(known, 0.0) > 1.0 - SURE else max(chances, key=lambda law: chances[law])
     return Laws(known, chosen, chances, len(compared.scores[chosen]))
