@@ -64,12 +64,13 @@ def test_causes_of_a_bad_fit_are_named():
 
 
 def test_a_friction_law_is_named_with_how_sure_it_is():
-    (line,) = warned(laws=Laws("lugre", "elasto_plastic", {"lugre": 0.004, "coulomb": 0.0, "elasto_plastic": 0.996}, 19))
+    line, believed = warned(laws=Laws("lugre", "elasto_plastic", {"lugre": 0.004, "coulomb": 0.0, "elasto_plastic": 0.996}, 19))
     assert line.startswith("friction.law = elasto_plastic, probability 0.996: lugre and coulomb predict ")
     assert line.endswith("(19 windows); was lugre")
+    assert believed.startswith("controllers believe the presliding of lugre, whatever friction.law is")
     (line,) = warned(laws=Laws("lugre", "lugre", {"lugre": 0.3, "coulomb": 0.0, "elasto_plastic": 0.7}, 19))
     assert line.startswith("friction.law = lugre, KEPT: the log cannot tell lugre 0.30, elasto_plastic 0.70 apart; coulomb ")
-    (line,) = warned(laws=Laws("lugre", "coulomb", {}, 0))
+    line, _ = warned(laws=Laws("lugre", "coulomb", {}, 0))
     assert line == "friction.law = coulomb, as given: no other law was tried"
 
 

@@ -38,6 +38,9 @@ SLOW = ("gms",)
 
 COMPARED = tuple(law for law in LAWS if law not in SLOW)
 
+BELIEVED = "lugre"
+"""The law whose presliding controllers believe, whatever the file of a rig says."""
+
 EVALUATIONS, MORE = 3, 6
 """Evaluations of a law's search before laws are compared, and further ones of those that these do not tell apart; assumed."""
 
@@ -67,18 +70,25 @@ class Laws:
         return tuple(sorted(found, key=lambda law: -self.chances[law]))
 
     def words(self) -> list[str]:
-        """The law, and how sure it is, in a line."""
+        """The law, how sure it is, and what controllers make of it, a line each."""
+        unlike = (
+            f"controllers believe the presliding of {BELIEVED}, whatever {LAW} is: without a force sensor they render "
+            "stiffness less exactly on this rig"
+        )
+        return [self._choice(), *([unlike] if self.chosen != BELIEVED else [])]
+
+    def _choice(self) -> str:
         if not self.chances:
-            return [f"{LAW} = {self.chosen}, as given: no other law was tried"]
+            return f"{LAW} = {self.chosen}, as given: no other law was tried"
         worse = [law for law in self.chances if law != self.chosen and law not in self.rivals]
         behind = f"{_listed(worse)} {'predicts' if len(worse) == 1 else 'predict'} windows that guided no fit worse"
         chance = self.chances[self.chosen]
         if not self.rivals:
             sure = "above 0.999" if chance > 0.999 else f"{chance:.3f}"
-            return [f"{LAW} = {self.chosen}, probability {sure}: {behind} ({self.windows} windows); was {self.owner}"]
+            return f"{LAW} = {self.chosen}, probability {sure}: {behind} ({self.windows} windows); was {self.owner}"
         told = ", ".join(f"{law} {self.chances[law]:.2f}" for law in (self.chosen, *self.rivals))
         how = "KEPT" if self.chosen == self.owner else f"the likeliest; was {self.owner}"
-        return [f"{LAW} = {self.chosen}, {how}: the log cannot tell {told} apart{f'; {behind}' if worse else ''}"]
+        return f"{LAW} = {self.chosen}, {how}: the log cannot tell {told} apart{f'; {behind}' if worse else ''}"
 
     def others(self) -> str:
         """Which friction a rig may have that the chosen law does not fit."""
