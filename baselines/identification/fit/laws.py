@@ -114,13 +114,16 @@ class _Compared:
     def add(self, law: str, start: Fit, weights: int = 1) -> None:
         """Search from another fit on under ``law``, which is left out where it comes to no end."""
         first, other = self._first, next(iter(self.fits.values()), None)
-        rig = first.rig.replace({LAW: law})
+        try:
+            rig, begun, owner = (one.replace({LAW: law}) for one in (first.rig, start.rig, self._owner))
+        except ValueError as error:  # no step of the integrator follows this rig under the law
+            self.failed.append(error)
+            return
         windows = cut(self._trial, rig, budget=first.problem.windows.budget)
         if other:
             given = other.problem.windows
             windows = replace(windows, pressure_weights=given.pressure_weights, position_weights=given.position_weights)
-        problem = Problem(windows, first.noise, self._owner.replace({LAW: law}), start.free, self._tick)
-        begun = start.rig.replace({LAW: law})
+        problem = Problem(windows, first.noise, owner, start.free, self._tick)
         self._search(law, problem, coordinates(begun, start.free), EVALUATIONS, weights, (begun, start.problem.offsets.sizes))
 
     def go_on(self, law: str) -> None:
