@@ -7,6 +7,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from baselines.identification.fit.laws import LAWS
 from baselines.identification.identified import Identified
 from baselines.identification.identified import identify as identify_trial
 from baselines.identification.log.log_columns import LogOptions
@@ -23,6 +24,7 @@ def identify(
     skip: int | None = None,
     decimal_comma: bool = False,
     seed: int = 0,
+    friction_law: str | None = None,
     progress: bool = True,
 ) -> Identified:
     r"""Estimate friction, mass, valves, dead volume and latency of a rig from a log, as ``birthsim identify`` does.
@@ -43,6 +45,8 @@ def identify(
         Whether the log has decimal commas.
     seed : int
         Of the rigs at which the search begins besides the owner's.
+    friction_law : str, optional
+        The friction law that is fitted, such as ``"elasto_plastic"``; else the one that the log supports best.
     progress : bool
         Whether a bar counts the evaluations of the search.
 
@@ -59,7 +63,8 @@ def identify(
     Notes
     -----
     Predictions of short windows of the log are fitted to what was measured by least squares, with the owner's values as
-    priors; docs/identify.md has the method, an experiment that tells all parameters, and how well it finds known rigs.
+    priors. Friction laws are compared by how well the fit of each predicts windows that did not guide it. docs/identify.md has
+    the method, an experiment that tells all parameters, and how well it finds known rigs.
 
     Examples
     --------
@@ -87,8 +92,10 @@ def identify(
         raise ValueError(f"log = {shown(log)}; allowed: the path of a file")
     if not (columns is None or isinstance(columns, Mapping)):
         raise ValueError(f"columns = {shown(columns)}; allowed: a mapping such as {{'force_x': 'Fz'}}")
+    if not (friction_law is None or (isinstance(friction_law, str) and friction_law in LAWS)):
+        raise ValueError(f"friction_law = {shown(friction_law)}; allowed: None or {', '.join(LAWS)}")
     owner = load_parameters(parameters)
     mapped = ",".join(f"{name}={column}" for name, column in (columns or {}).items())
     trial = read_trial(Path(path), owner, LogOptions(mapped, skip, decimal_comma))
     with tqdm(desc="fit", unit=" evaluations", leave=False, disable=not progress) as bar:
-        return identify_trial(trial, owner, seed, tick=bar.update)
+        return identify_trial(trial, owner, seed, tick=bar.update, friction_law=friction_law)

@@ -8,9 +8,10 @@ import numpy as np
 import tomli_w
 
 from baselines.identification.fit.certainty import DETERMINED, NORMAL, Certainty, certainty_of
-from baselines.identification.fit.estimate import Fit, fit, refine
+from baselines.identification.fit.estimate import Fit, refine
 from baselines.identification.fit.forms import Suspect, shown, suspects
 from baselines.identification.fit.free_parameters import FreeParameter, free_of, shown_by, with_more
+from baselines.identification.fit.laws import LAW, Laws, fit_law
 from baselines.identification.fit.problem import Tick
 from baselines.identification.log.log_columns import CHAMBERS
 from baselines.identification.log.trial import Trial
@@ -72,6 +73,8 @@ class Identified:
         Residuals of each chamber's pressures over the noise that third differences show.
     suspects : tuple of Suspect
         Forms that the log shows and the model lacks, the likeliest first.
+    laws : Laws
+        The friction law that was chosen, and how likely each law is.
     zeros, known_zeros : tuple of array (2,), array (2,)
         What the zeros of encoders are off and the standard deviations, and those that were known before, m; empty where a
         tracker sees the end effector.
@@ -94,6 +97,7 @@ class Identified:
     notes: tuple[str, ...]
     pull: ForceOffset
     left_over: Array
+    laws: Laws
     suspects: tuple[Suspect, ...] = ()
     zeros: tuple[Array, Array] = (np.empty(0), np.empty(0))
     known_zeros: Array = field(default_factory=lambda: np.empty(0))
@@ -105,7 +109,7 @@ class Identified:
 
     def words(self) -> list[str]:
         """The result in lines."""
-        lines = [row.words() for row in self.rows]
+        lines = [*(row.words() for row in self.rows), *self.laws.words()]
         pressure, position = self.misfit
         lines.append(f"noise of pressures {self.noise.pressure:.4g} Pa, of positions {1e3 * self.noise.position:.4g} mm")
         lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
@@ -138,9 +142,7 @@ class Identified:
     def _forms(self) -> str:
         """What may be of another form, by the signal that fits worse."""
         if self.misfit[1] > self.misfit[0]:
-            return (
-                'friction of another law, such as friction.law = "gms", or along the stroke, a bore or a lever measured wrong'
-            )
+            return f"{self.laws.others()}, friction along the stroke, a bore or a lever measured wrong"
         return "leaks, spools of second order, commands that are late, a curve of the valves or a tube that it does not know"
 
     def _encoders(self) -> list[str]:
@@ -213,10 +215,12 @@ def identify(
     seed: int = 0,
     free: tuple[FreeParameter, ...] | None = None,
     tick: Tick = lambda: None,
+    friction_law: str | None = None,
 ) -> Identified:
     """The rig of a trial, as far as the trial determines it; all else is the owner's.
 
-    Without ``free``, what a rig as its owner's has is identified, and what else the log shows (``forms``).
+    Without ``free``, what a rig as its owner's has is identified, and what else the log shows (``forms``). Without a
+    ``friction_law`` the laws that the plant knows are compared (``laws``).
     Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
     of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
     ``REMEMBER``.
@@ -225,7 +229,8 @@ def identify(
     if given:
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
     asked = free_of(owner, trial.latency) if free is None else free
-    whole = fit(trial, owner, seed, asked, tick)
+    whole, laws = fit_law(trial, owner, seed, asked, tick, friction_law)
+    owner = owner.replace({LAW: laws.chosen})
     more = () if free is not None else shown_by(owner)
     for _ in range(MOST_FORMS):
         with whole.problem.explained():
@@ -263,7 +268,7 @@ def identify(
     rig, quick = owner.replace({**changes, **noise}), guessed_noise(trial)
     left = left_over(last, trial)
     return Identified(
-        tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left, tuple(others), zeros, before
+        tuple(rows), rig, last, certainty, last.noise, quick, trial.notes, pull, left, laws, tuple(others), zeros, before
     )
 
 

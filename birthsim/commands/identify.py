@@ -24,7 +24,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 ONLY_WITH = {
     **{"duration": "propose", "controller": "simulate", "sensors": "simulate"},
-    **dict.fromkeys(("report", "columns", "skip", "decimal_comma"), "log"),
+    **dict.fromkeys(("report", "columns", "skip", "decimal_comma", "friction_law"), "log"),
     "valve": "valve_table",
 }
 """Option -> the one of log, propose and simulate that it belongs to."""
@@ -44,6 +44,8 @@ class Settings(Configured):
     """Lines of the log before its heading, where it is not found by itself."""
     decimal_comma: bool = False
     """The log has decimal commas."""
+    friction_law: Literal["lugre", "coulomb", "elasto_plastic", "gms"] | None = None
+    """The friction law that is fitted, else the one that the log supports best."""
     propose: Annotated[Path | None, Parameter(metavar="PLAN")] = None
     """Write an experiment as CSV: target, and openings to add."""
     simulate: Annotated[Path | None, Parameter(metavar="PLAN")] = None
@@ -125,7 +127,7 @@ def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
     print("".join(f"{note}\n" for note in trial.notes), end="", flush=True)
     folder = None if settings.report is None else make_folder(settings.report)
     with _bar(None, "fit", "evaluations") as tick:
-        found = identify(trial, owner, settings.seed, tick=tick)
+        found = identify(trial, owner, settings.seed, tick=tick, friction_law=settings.friction_law)
     found.write(out, log.name)
     print("\n".join(found.words()))
     print(f"written to {out}: {sum(row.determined for row in found.rows)} of {len(found.rows)} parameters are from the log")

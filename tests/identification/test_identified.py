@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from baselines.identification.fit.laws import Laws
 from baselines.identification.identified import Identified, Row
 from baselines.identification.windows.force_offset import ForceOffset
 from baselines.identification.windows.starts import Noise
@@ -14,10 +15,22 @@ NOISE = Noise(500.0, 1e-4)
 NO_FORCE = ForceOffset(np.array([0.2, 0.9]), np.array([0.01, 0.3]))
 
 
-def made(rows=(), noise=NOISE, pull=NO_FORCE, biases=(0.0, 900.0, -4000.0, 5000.0), ended=True, left=(1.0, 0.9, 1.1, 1.0)):
+FOUND = Laws("lugre", "lugre", {"lugre": 1.0, "coulomb": 0.0, "elasto_plastic": 0.0}, 19)
+
+
+def made(
+    rows=(),
+    noise=NOISE,
+    pull=NO_FORCE,
+    biases=(0.0, 900.0, -4000.0, 5000.0),
+    ended=True,
+    left=(1.0, 0.9, 1.1, 1.0),
+    laws=FOUND,
+):
     fit = SimpleNamespace(problem=SimpleNamespace(offsets=SimpleNamespace(biases=biases)), ended=ended)
     certainty = SimpleNamespace(weakest=())
-    return Identified(rows, Parameters(), fit, certainty, noise, NOISE, ("left out: a row",), pull, np.array(left))  # type: ignore[arg-type]
+    notes = ("left out: a row",)
+    return Identified(rows, Parameters(), fit, certainty, noise, NOISE, notes, pull, np.array(left), laws)  # type: ignore[arg-type]
 
 
 def said(name, value, determined=True):
@@ -48,6 +61,23 @@ def test_causes_of_a_bad_fit_are_named():
     assert "[valve_n2]" in line
     (line,) = warned(ended=False)
     assert "evaluations" in line
+
+
+def test_a_friction_law_is_named_with_how_sure_it_is():
+    line, believed = warned(laws=Laws("lugre", "elasto_plastic", {"lugre": 0.004, "coulomb": 0.0, "elasto_plastic": 0.996}, 19))
+    assert line.startswith("friction.law = elasto_plastic, probability 0.996: lugre and coulomb predict ")
+    assert line.endswith("(19 windows); was lugre")
+    assert believed.startswith("controllers believe the presliding of lugre, whatever friction.law is")
+    (line,) = warned(laws=Laws("lugre", "lugre", {"lugre": 0.3, "coulomb": 0.0, "elasto_plastic": 0.7}, 19))
+    assert line.startswith("friction.law = lugre, KEPT: the log cannot tell lugre 0.30, elasto_plastic 0.70 apart; coulomb ")
+    line, _ = warned(laws=Laws("lugre", "coulomb", {}, 0))
+    assert line == "friction.law = coulomb, as given: no other law was tried"
+
+
+def test_a_bad_fit_of_the_motion_says_that_no_friction_law_fits():
+    (line,) = warned(noise=Noise(500.0, 1.3e-4))
+    assert "in the positions: another law of friction (none of lugre, coulomb and elasto_plastic fits; not tried: " in line
+    assert "--friction-law gms), friction along the stroke" in line
 
 
 def test_what_was_left_out_stands_in_the_file_of_the_rig(tmp_path):

@@ -66,12 +66,13 @@ class Fit:
         return np.asarray(np.linalg.inv(self.jacobian.T @ self.jacobian))
 
 
-def search(problem: Problem, theta: Array, most: int) -> Fit:
-    """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations, again while weights change."""
+def search(problem: Problem, theta: Array, most: int, weights: int = MOST_WEIGHTS) -> Fit:
+    """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations, again while weights change: with
+    at most so many ``weights``."""
     low, high = problem.limits
     place = np.clip(theta, low + 1e-6, high - 1e-6)
     with problem.explained():
-        for left in reversed(range(MOST_WEIGHTS)):
+        for left in reversed(range(weights)):
             if not np.isfinite(problem.residuals(place)).all():
                 raise ValueError(problem.disagreement())
             try:
@@ -119,6 +120,11 @@ def fit(
     trial: Trial, owner: Parameters, seed: int = 0, free: tuple[FreeParameter, ...] = FREE_PARAMETERS, tick: Tick = lambda: None
 ) -> Fit:
     """The parameters of a trial's rig; ``owner`` is the rig as its owner describes it, ``seed`` draws where to begin."""
+    return refine(trial, begin(trial, owner, seed, free, tick), owner, free, tick)
+
+
+def begin(trial: Trial, owner: Parameters, seed: int, free: tuple[FreeParameter, ...], tick: Tick) -> Fit:
+    """The first search, on a few short windows."""
     some = spread_out(cut(trial, owner, SHORT))
     problem = Problem(some, guessed_noise(trial), owner, free, tick)
     with problem.explained():
@@ -136,7 +142,7 @@ def fit(
             break
     if not tried:
         raise failed[0]
-    return refine(trial, min(tried, key=lambda one: one.cost), owner, free, tick)
+    return min(tried, key=lambda one: one.cost)
 
 
 def refine(trial: Trial, first: Fit, owner: Parameters, free: tuple[FreeParameter, ...], tick: Tick = lambda: None) -> Fit:
