@@ -9,7 +9,8 @@ from birthsim_env.physics.compiled.lanes import PN2, PP2, Rig, parameter_array, 
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
-from lab.studies.bandwidth.study import BANDS, felt_impedance, hand_lines, lines
+from lab.studies.bandwidth.stimuli import BANDS, hand_lines, lines
+from lab.studies.bandwidth.study import felt_impedance
 from lab.studies.bandwidth.valves import commanded_openings
 from lab.studies.haptics.recording import record
 from lab.studies.haptics.worlds import POSES, Condition, resting

@@ -1,4 +1,4 @@
-"""Up to which frequency a hand feels the impedance declared, on a dense grid, and up to which one the valves allow it."""
+"""Up to which frequency a hand feels the impedance declared, push by push (``stimuli``), and up to which valves allow it."""
 
 from typing import Any
 
@@ -20,21 +20,15 @@ from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
+from lab.studies.bandwidth.stimuli import KINDS, Multisine, stimuli, words_of
 from lab.studies.bandwidth.valves import commanded_openings
 from lab.studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
-from lab.studies.haptics.multisine import FADE, sines, unit_multisine
+from lab.studies.haptics.multisine import FADE, sines
 from lab.studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
 from lab.studies.sensorless.own_logs import Informed
 
 STIFFNESS = 2000.0
 """N/m."""
-
-BANDS = ((0.1, 0.95, 80.0, 1), (1.0, 20.0, 20.0, 2))
-"""Hz from and to; s of a period, and periods that are measured. Two multisines, so that a line has a force worth feeling."""
-
-SINE, SINE_STEP, SINE_TIME = 20.0, 2, 2.0
-"""N of a hand that pushes with one sine at a time, which lines of the grid it takes, and s that it is measured at least, over
-two periods or more."""
 
 SETTLING = 5.0
 """s before the measured periods; assumed."""
@@ -51,12 +45,11 @@ RIGS = {
 """Sensors by their name in the table -> sensor model, and the file of the rig that controllers believe. With ``KNOWN`` they are
 told each rig that is drawn, as after ``birthsim identify``."""
 
-WITH_SINES = (
-    ("admittance-adaptive", KNOWN),
-    ("admittance-sensorless", "honest, acceleration"),
-    ("admittance-sensorless", KNOWN),
-)
-"""Of ``MEASURED`` those that are also felt with one sine at a time."""
+CLOSELY = (
+    ("admittance-adaptive", "honest"), ("admittance-adaptive", "honest, acceleration"), ("admittance-adaptive", KNOWN),
+    ("admittance-sensorless", "honest, acceleration"), ("admittance-sensorless", KNOWN),
+)  # fmt: skip
+"""Of ``MEASURED`` those that slow lines and lone sines push too."""
 
 MEASURED = (
     ("backstepping", "honest"), ("admittance-adaptive", "ideal"), ("admittance-adaptive", "honest"),
@@ -65,25 +58,17 @@ MEASURED = (
 )  # fmt: skip
 """Controllers, and the sensors of ``RIGS`` that they have."""
 
+SAID = (
+    "A bandwidth belongs to its push. *Lines* are sines at once: of a multisine those below 1 Hz, and after these those from 1 "
+    "to 20 Hz, 20 a decade. A *lone sine* is one at a time. Cells: median over the rigs, its 95 % interval; the worst rig."
+)
+"""Above the table."""
+
 COLUMNS = [
     *("controller", "sensors", "push", "axis"),
     *(f"{name}{part}" for name in ("bandwidth", "unnoticed", "allowed") for part in ("", "_low", "_high", "_worst")), "lost",
 ]  # fmt: skip
 """Of the figures; those of frequencies in Hz."""
-
-
-def lines(low: float, high: float, period: float) -> Array:
-    """Frequencies (F,), Hz: 20 a decade (ISO 3, R 20), to the nearest whole multiple of 1/``period``."""
-    steps = np.arange(np.floor(20 * np.log10(low)), np.ceil(20 * np.log10(high)) + 1)
-    exact = 10 ** (steps / 20)
-    kept = exact[(exact > 0.99 * low) & (exact < 1.01 * high)]
-    return np.asarray(np.unique(np.round(kept * period)) / period)
-
-
-def hand_lines(peak: float, seed: int, frequency: Array, period: float) -> Complex:
-    """Complex amplitudes (F,), N, of a multisine with a peak of ``peak``, N: the force is the real part of their sum."""
-    size, phases = unit_multisine(seed, frequency, period)
-    return np.asarray(peak * size * np.exp(1j * (phases - np.pi / 2)))
 
 
 def felt_impedance(
@@ -130,27 +115,11 @@ def _cases(condition: Condition) -> tuple[list[Parameters], Array, Reference]:
     return each, np.transpose(directions), resting(poses, [STIFFNESS] * len(cases))
 
 
-def measure(peak: float, known: bool, **settings: Any) -> Result:
-    """Bandwidth, and up to where 1 JND holds, Hz, under pushes of ``peak`` N at most: over directions and rigs, (2, R) each.
-
-    ``known``: the controller is told each rig that is drawn.
+def measure(push: str, size: float, known: bool, **settings: Any) -> Result:
+    """Bandwidth, and up to where 1 JND holds, Hz, under a ``push`` of ``KINDS`` of a ``size``, N: over directions and rigs,
+    (2, R) each. ``known``: the controller is told each rig that is drawn.
     """
-    pushes = []
-    for low, high, period, periods in BANDS:
-        own = lines(low, high, period)
-        pushes.append((own, hand_lines(peak, settings["seed"], own, period), period, periods))
-    return _measured_with(pushes, known, settings)
-
-
-def measure_sines(size: float, known: bool, **settings: Any) -> Result:
-    """The same under one sine of ``size`` N at a time."""
-    every = np.concatenate([lines(low, high, period) for low, high, period, _ in BANDS])[::SINE_STEP]
-    pushes = [(own, np.array([-1j * size]), 1 / own[0], max(2, round(SINE_TIME * own[0]))) for own in every[:, None]]
-    return _measured_with(pushes, known, settings)
-
-
-def _measured_with(pushes: list[tuple[Array, Complex, float, int]], known: bool, settings: dict[str, Any]) -> Result:
-    """What is felt under one push after another: its frequencies, amplitudes, period, and how many periods are measured."""
+    pushes = KINDS[push](size, settings["seed"]).pushes
     condition = condition_of(**settings)
     rigs, direction, reference = _cases(condition)
     if known:
@@ -158,7 +127,7 @@ def _measured_with(pushes: list[tuple[Array, Complex, float, int]], known: bool,
     declared = declared_by(condition.law(), reference)
     if declared is None:
         raise ValueError(f"controller = {condition.controller!r}; allowed: one that declares an impedance")
-    frequency = np.concatenate([own for own, *_ in pushes])
+    frequency = np.concatenate([one.frequency for one in pushes])
     felt, lost = [], np.zeros(len(rigs), dtype=np.bool_)
     for own, force, period, periods in pushes:
         found, gone = felt_impedance(condition, rigs, reference, direction, own, force, period, periods)
@@ -173,9 +142,8 @@ def _measured_with(pushes: list[tuple[Array, Complex, float, int]], known: bool,
 def allowed(peak: float, **settings: Any) -> Result:
     """The last line, Hz, up to which valves can render ``admittance``'s impedance exactly, over directions and rigs, (2, R)."""
     condition = condition_of(**settings)
-    low, high, period, _ = BANDS[-1]
-    frequency = lines(low, high, period)
-    force, found = hand_lines(peak, condition.seed, frequency, period)[:, None], []
+    frequency, amplitudes, period, _ = Multisine(peak, condition.seed).pushes[-1]
+    force, found = amplitudes[:, None], []
     for lane, rig in enumerate((cases := _cases(condition))[0]):
         direction, reference = cases[1][:, [lane]], Reference(cases[2].rows[:, [lane]])
         declared = mass_spring_damper(reference, condition.rig.mechanics.mass, DAMPING_RATIO)
@@ -190,23 +158,18 @@ def _settings(controller: str, sensors: str, options: Options) -> dict[str, Any]
     return {**own, "sensors": model, "seed": options.seed, "rigs": options.rigs, "force_sensor": True}
 
 
-def _pushes(options: Options) -> list[str]:
-    """How the table calls what the hand does: multisines by their peak, and one sine at a time."""
-    return [*(f"{peak:g} N" for peak in options.peak), f"one sine of {SINE:g} N"]
-
-
 def _tasks(options: Options) -> dict[Any, Task]:
     found: dict[Any, Task] = {}
-    *multisines, sine = _pushes(options)
     for controller, sensors in MEASURED:
         settings = {**_settings(controller, sensors, options), "known": sensors == KNOWN}
-        stem = f"{file_stem(controller)}/{file_stem(sensors)}"
-        for push, peak in zip(multisines, options.peak, strict=True):
-            found[controller, sensors, push] = Task(f"{stem}-{peak:g}", measure, {**settings, "peak": peak})
-        if (controller, sensors) in WITH_SINES:
-            found[controller, sensors, sine] = Task(f"{stem}-sine", measure_sines, {**settings, "size": SINE})
-    for push, peak in zip(multisines, options.peak, strict=True):
-        found[push] = Task(f"allowed/{peak:g}", allowed, {**_settings("admittance-adaptive", "ideal", options), "peak": peak})
+        for kind in KINDS if (controller, sensors) in CLOSELY else ("peak",):
+            for size in getattr(options, kind):
+                name = f"{file_stem(controller)}/{file_stem(sensors)}-{kind}-{size:g}"
+                push = KINDS[kind](size, options.seed).name
+                found[controller, sensors, push] = Task(name, measure, {**settings, "push": kind, "size": size})
+    for peak in options.peak:
+        settings = {**_settings("admittance-adaptive", "ideal", options), "peak": peak}
+        found[Multisine(peak, options.seed).name] = Task(f"allowed/{peak:g}", allowed, settings)
     return found
 
 
@@ -229,17 +192,11 @@ def _kept(options: Options, found: Found) -> Any:
             found[controller, sensors, push]["lost"],
         ]
         for controller, sensors in MEASURED
-        for push in _pushes(options)
+        for push in stimuli(options)
         if (controller, sensors, push) in found
         for way, axis in enumerate("xy")
     ]
-    return {"columns": COLUMNS, "rows": rows, "lines": [_line(options.seed, *band) for band in BANDS]}
-
-
-def _line(seed: int, low: float, high: float, period: float, periods: int) -> list[float]:
-    """Of a multisine with a peak of 1 N: how many sines it has, Hz from and to, and the size of each, N."""
-    own = lines(low, high, period)
-    return [len(own), own[0], own[-1], unit_multisine(seed, own, period)[0]]
+    return {"columns": COLUMNS, "rows": rows}
 
 
 def _shown(content: Content) -> dict[str, str]:
@@ -250,30 +207,26 @@ def _shown(content: Content) -> dict[str, str]:
             "-" if row[first] is None else "{} [{}, {}]; {}".format(*map(number, row[first : first + 4]))
             for first in (4, 8, 12)
         ]
-        push = row[2] if row[2].startswith("one") else f"multisines of {row[2]} at most"
+        push = words_of(row[2], content["settings"]["seed"])
         model, file = RIGS[row[1]]
         rig = information.TOLD if row[1] == KNOWN else information.DEFAULT
         facts = information.informed(row[0], model, rig=rig, parameters=file or "")
         rows.append([row[0], *facts, row[1], push, row[3], *cells, str(row[-1])])
     alike = [(row[1], *row[3:7]) for row in rows[1:]]
-    return {"bandwidth.md": f"{_stimuli(content)} {information.LEGEND}\n\n{markdown(rows, most=rows[0][7:9], alike=alike)}\n"}
-
-
-def _stimuli(content: Content) -> str:
-    """What the multisines are made of, in a sentence."""
-    parts, peaks = [], content["settings"]["peak"]
-    for count, low, high, size in content["figures"]["lines"]:
-        sizes = " or ".join(number(peak * size) for peak in peaks)
-        parts.append(f"{count} sines at once from {low:g} to {high:g} Hz, each of {sizes} N")
-    return f"A multisine of {' or '.join(f'{peak:g}' for peak in peaks)} N at most is {', and then '.join(parts)}."
+    return {"bandwidth.md": f"{SAID} {information.LEGEND}\n\n{markdown(rows, most=rows[0][7:9], alike=alike)}\n"}
 
 
 STUDY = Study(
-    {"peak": (2.0, 10.0, 20.0), "rigs": 36, "seed": 7_300_000},
+    {"peak": (2.0, 10.0, 20.0), "slow": (4.9,), "sine": (5.0, 20.0), "rigs": 36, "seed": 7_300_000},
     _tasks,
     _kept,
     {"bandwidth": "Hz", "unnoticed": "Hz", "allowed": "Hz"},
     _shown,
-    words={"peak": "N that multisines of the hand reach", "rigs": "randomised ones"},
+    words={
+        "peak": "N that multisines of the hand reach",
+        "slow": "N of each of its slow lines",
+        "sine": "N of its lone sines",
+        "rigs": "randomised ones",
+    },
 )
 register(study="bandwidth", about="up to which frequency a hand feels what is declared")(STUDY)

@@ -7,6 +7,7 @@ geometry, then fall between the lines (Pintelon and Schoukens, System Identifica
 
 import numpy as np
 
+from baselines.bench.statistics import number
 from baselines.impedance import Complex
 from birthsim_env.physics.compiled.lanes import Array
 from lab.studies.haptics.recording import Recording
@@ -43,6 +44,11 @@ def unit_multisine(seed: int, frequency: Array = FREQUENCIES, period: float = 1 
     peaks = [np.abs(sines(time, frequency, one)).max() for one in drawn]
     chosen = np.asarray(drawn[int(np.argmin(peaks))])
     return 1 / float(np.abs(sines(np.arange(0, period, 1e-3), frequency, chosen)).max()), chosen
+
+
+def words(peak: float, seed: int) -> str:
+    """What tables say of the multisine of ``FREQUENCIES`` that reaches ``peak``, N: how many lines, and the newtons of each."""
+    return f"{len(FREQUENCIES)} lines of {number(peak * unit_multisine(seed)[0])} N, {peak:g} N at most"
 
 
 def multisine_hand(direction: Array, peak: Array, seed: int) -> Hand:

@@ -11,6 +11,7 @@ from lab.engine import information
 from lab.engine.tables import markdown
 from lab.studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
 from lab.studies.haptics.kept import PEAK
+from lab.studies.haptics.multisine import words
 from lab.studies.haptics.release import PULL, STIFFNESS
 
 Runs = Sequence[dict[str, Any]]
@@ -57,7 +58,7 @@ def rendering_table(runs: Runs, parameters: str = "") -> str:
         "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %", "lost",
     )  # fmt: skip
     own = columns[len(WHO) + 1 : -1]
-    return _table(f"### Impedance under multisines of {PEAK:g} N", columns, rows, own[3:], own[:3])
+    return _table(f"### Impedance under {words(PEAK, runs[0]['seed'])}", columns, rows, own[3:], own[:3])
 
 
 def release_table(runs: Runs, parameters: str = "") -> str:

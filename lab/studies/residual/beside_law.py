@@ -28,6 +28,7 @@ from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import markdown
 from lab.engine.worlds import worlds
+from lab.studies.haptics.multisine import words
 from lab.studies.haptics.rendering import rendering
 from lab.studies.haptics.worlds import Condition
 
@@ -232,7 +233,8 @@ def _shown(content: Content) -> dict[str, str]:
             felt = [*(_entry(row[key]) for key in FELT), *better, _entry(row["lost"])]
             rows.append([row["who"], *_told(row["who"], settings), *felt])
         parts += [
-            f"What a hand feels: multisines of {PUSH:g} N at {SETPOINT:g} N/m on {settings['rigs']} randomised rigs, means "
+            f"What a hand feels: {words(PUSH, settings['seed'])}, at {SETPOINT:g} N/m on "
+            f"{settings['rigs']} randomised rigs, means "
             "over three poses and two directions.",
             markdown(rows),
         ]
