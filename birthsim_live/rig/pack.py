@@ -3,6 +3,7 @@
 The files of ``page/worker`` read it. The code of the parts is the same for every rig and policy.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -190,7 +191,9 @@ def _problem(name: str, rig: Parameters) -> str:
 
 def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
     """The parts of a sensor model, for each episode; none where it is not compiled. The stages have a clock of their own."""
-    model: SensorModel = entry("sensors", name).made(rig.electronics, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the list of models says what one needs of the rig, and this packs all
+        model: SensorModel = entry("sensors", name).made(rig.electronics, 1)
     period, episodes = rig.electronics.control_period, list[Any]()
     enter, leave = (Stage(one, Period.numbers(period=period), INPUT_MEMORY) for one in (enter_sensors, leave_sensors))
     for episode in range(EPISODES):

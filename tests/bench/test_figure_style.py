@@ -43,7 +43,7 @@ DRAWINGS = {
     "controllers": controllers,
     "correction": lambda folder: draw_corrections(2 * (np.arange(5.0),), 0.9, 2 * (np.ones((2, 5)).cumsum(axis=1),), folder),
 }
-UNIT = r"\((mm|µm|%|N|N/m|kN/m|kg|s|ms|Hz|-|N s/m|J|degrees|million|normal l/min|bar|1/s|m)\)|% of|fraction of|^magnitude"
+UNIT = r"\((mm|µm|%|N|N/m|kN/m|kg|s|ms|Hz|-|N s/m|J|degrees|million|normal l/min|bar|1/s|m|euro)\)|% of|fraction of|^magnitude"
 RESULTS = {name: of_result(name) for name in names() if declared(name).draw is not no_pictures}
 
 

@@ -1,6 +1,7 @@
 """Encoders and rod gauges: what they show of a moving rig, against the linkage's own equations, and each of their errors."""
 
 import math
+import warnings
 
 import gymnasium
 import numpy as np
@@ -152,3 +153,14 @@ def test_what_is_drawn_are_the_sensors_that_there_are(name):
         assert ((low <= values) & (values <= high)).all()
         assert np.ptp(values) > 0
     env.close()
+
+
+@pytest.mark.parametrize("name", ["encoders-gauges", "tracker-gauges"])
+def test_gauges_without_an_acceleration_sensor_warn_and_say_what_they_need(name):
+    made = entry("sensors", name)
+    with pytest.warns(UserWarning, match=r"electronics\.acceleration_bandwidth = 0: .*; give the rig one, such as 300 Hz"):
+        made.made(Parameters().electronics, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made.made(rig(ACCELEROMETER).electronics, 1)
+    assert made.needs == {"acceleration sensor"}

@@ -10,6 +10,7 @@ counts m a as a hand's force.
 """
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,9 @@ from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.linkage import geometry, mechanics
 from birthsim_env.registry import register
+
+NEEDS = {"acceleration sensor"}
+"""What gauges cannot do without: it takes off what moves the head."""
 
 
 class Rods(Rows):
@@ -147,6 +151,13 @@ class GaugingBoard(JointBoard):
     """A board that works out the hand's force from rod gauges."""
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
+        if electronics.acceleration_bandwidth == 0.0:
+            warnings.warn(
+                "rod gauges with electronics.acceleration_bandwidth = 0: without an acceleration sensor the inertia of a "
+                "moving head counts as a hand's force, and controllers that trust it make the head shake; give the rig one, "
+                "such as 300 Hz",
+                stacklevel=2,
+            )
         super().__init__(electronics, num_envs)
         self._rods: Array = np.zeros((Rods.size, num_envs))
 
@@ -158,14 +169,24 @@ class GaugingBoard(JointBoard):
         return Stage(_look, self._joint_shared, tables=self._tables)
 
 
-@register(sensors="encoders-gauges", about="As encoders, with gauges in both rods in place of the force sensor.", order=5)
+@register(
+    sensors="encoders-gauges",
+    about="As encoders, with gauges in both rods in place of the force sensor; the rig needs an acceleration sensor.",
+    needs=NEEDS,
+    order=5,
+)
 class EncoderGaugeSensors(GaugingBoard, CountingBoard):
     """Encoders and gauges at both rods, and pressure cells: nothing is at the head."""
 
     drawn = drawn_without(*TRACKER_PARAMETERS, *FORCE_PARAMETERS, also=(*ENCODER_PARAMETERS, *GAUGE_PARAMETERS))
 
 
-@register(sensors="tracker-gauges", about="As honest, with gauges in both rods in place of the force sensor.", order=6)
+@register(
+    sensors="tracker-gauges",
+    about="As honest, with gauges in both rods in place of the force sensor; the rig needs an acceleration sensor.",
+    needs=NEEDS,
+    order=6,
+)
 class TrackerGaugeSensors(GaugingBoard):
     """A tracker at the head, gauges at both rods, and pressure cells."""
 

@@ -7,7 +7,7 @@ what it does not hide from a lone sine of the whole force.
 import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -150,6 +150,7 @@ def stimuli(options: Options) -> dict[str, Stimulus]:
     return {one.name: one for one in every}
 
 
+@cache
 def words_of(name: str, seed: int) -> str:
     """What tables call the push that results call ``name``."""
     for kind in KINDS.values():
