@@ -42,11 +42,18 @@ def result(lost=(False, False, False), cost=1.0, **metrics):
     return {"seeds": [0, 1, 2], "metrics": {**columns, **metrics}, "lost": list(lost), "cost": cost}
 
 
+class Nobody:
+    """A controller of which tables ask what it is told, learns and senses, and no more."""
+
+    def __init__(self, parameters):
+        self.parameters = parameters
+
+
 @pytest.fixture(autouse=True)
 def names(monkeypatch):
     """Of the controllers below, as tables ask what they need."""
     for name in ("other", "worst"):
-        registered(monkeypatch, object, needs={"force sensor"}, controller=name)
+        registered(monkeypatch, Nobody, needs={"force sensor"}, controller=name)
 
 
 @pytest.fixture

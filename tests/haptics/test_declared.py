@@ -31,7 +31,11 @@ def test_series_of_a_piston():
     assert missed(0.1) / missed(0.05) == pytest.approx(8, rel=0.01)
 
 
-@pytest.mark.parametrize("name", controlling_names())
+INTEGRAL = "backstepping-integral"
+"""It takes a slow push for an error of its model, and has no stiffness left for it."""
+
+
+@pytest.mark.parametrize("name", [name for name in controlling_names() if name != INTEGRAL])
 def test_every_law_declares_the_stiffness_that_is_asked_for(name):
     """(18) loses nothing of a stiffness that is the same along x and y; mass and damping are positive definite."""
     declared = declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0]))
@@ -42,8 +46,8 @@ def test_every_law_declares_the_stiffness_that_is_asked_for(name):
             assert np.linalg.eigvalsh(matrix[..., lane] + matrix[..., lane].T).min() > 0
 
 
-@pytest.mark.parametrize("name", uncontrolled_names())
-def test_what_is_no_law_declares_nothing(name):
+@pytest.mark.parametrize("name", [*uncontrolled_names(), INTEGRAL])
+def test_what_has_no_stiffness_declares_nothing(name):
     assert declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0])) is None
 
 

@@ -38,7 +38,8 @@ def test_the_tables_have_both_rigs_and_every_part():
     assert [rig for rig, _, _ in tasks] == list(EXCHANGED)
     figures = measured_rig.STUDY.keep(OPTIONS, {key: {name: [1.5, 2.5] for name in measured_rig.COLUMNS} for key in tasks})
     text = measured_rig.STUDY.show({"figures": figures, "settings": vars(OPTIONS)})["measured-rig.md"]
-    assert f"| `admittance-adaptive` | ideal |{6 * ' 1.5 / 2.5 |'}\n" in text, "assumed and measured, of three metrics"
+    row = "| `admittance-adaptive` | default | no | yes | ideal |"
+    assert f"{row}{6 * ' 1.5 / 2.5 |'}\n" in text, "assumed and measured, of three metrics"
     assert [line.split(" | ")[1] for line in text.splitlines() if line.startswith("| ideal")] == ["nothing", *ASSUMED, "all"]
 
 

@@ -179,6 +179,20 @@ def _panels(count: int, height: float, **options: Any) -> tuple[Figure, Iterator
     return figure, iter(panels.flat[:count])
 
 
+LONGEST = 23
+"""Letters of a name that fit above the narrowest panel."""
+
+
+def _title(axes: Axes, name: str, said: str) -> None:
+    """Above a panel; a long name takes two lines, broken at the hyphen nearest to its middle."""
+    label = label_of(name)
+    if len(label) > LONGEST:
+        hyphens = [k + 1 for k, letter in enumerate(label) if letter == "-"]
+        middle = min(hyphens, key=lambda k: abs(k - len(label) / 2))
+        label = f"{label[:middle]}\n{label[middle:]}"
+    axes.set_title(f"{label}\n{said}", loc="center")
+
+
 def polar_figure(study: Study, folder: Path) -> list[Path]:
     """Rendered stiffness over the direction of the push, a panel per controller: median and range over poses."""
     figure, panels = _panels(len(study), 1.9, subplot_kw={"projection": "polar"})
@@ -194,7 +208,7 @@ def polar_figure(study: Study, folder: Path) -> list[Path]:
         axes.set_yticks([setpoint / 2, setpoint, 1.5 * setpoint], [])
         axes.set_xticks(np.arange(4) * np.pi / 2, ["$x$", "$y$", "$-x$", "$-y$"])
         axes.tick_params(pad=-2)
-        axes.set_title(f"{label_of(name)}\n{_range(rendered)}", loc="center")
+        _title(axes, name, _range(rendered))
         round_off = float(np.abs(middle / setpoint - 1).max())
         alike += 100 * round_off <= EXACT
     headline(figure, f"{alike} of {len(study)} controllers are as stiff as asked for in every direction, to {EXACT:g} %")
@@ -234,7 +248,7 @@ def ellipse_figure(study: Study, folder: Path) -> list[Path]:
         off = [np.linalg.norm(_numbers(m) - wanted) / np.linalg.norm(wanted) for m in result["stiffness"] if m is not None]
         worst = f"off by {_percent(float(np.median(off)))}; {_percent(float(max(off)))}" if off else "all lost"
         alike += bool(off) and 100 * float(np.median(off)) <= EXACT
-        axes.set_title(f"{label_of(name)}\n{worst}", loc="center")
+        _title(axes, name, worst)
         axes.set_aspect("equal")
         axes.set(xlim=(355, 645), ylim=(-130, 95))
         if k == 0:
