@@ -109,7 +109,7 @@ def stiffness_figure(study: Study, folder: Path) -> list[Path]:
 
 def hunting_figure(study: Study, folder: Path) -> list[Path]:
     """Peak-to-peak motion at rest and in the hold: a box per controller over the cases of the stiffness study."""
-    figure, axes = plt.subplots(figsize=(COLUMN, 1.3 + 0.2 * len(study)), layout="constrained")
+    figure, axes = plt.subplots(figsize=(PAGE, 1.3 + 0.2 * len(study)), layout="constrained")
     labels, cases = [], []
     for name, result in study.items():
         hunting = _numbers(result["hunting_mm"]).ravel()
