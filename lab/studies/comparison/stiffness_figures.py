@@ -83,14 +83,14 @@ def _percent_axis(axes: Axes, linear: float) -> None:
 
 def stiffness_figure(study: Study, folder: Path) -> list[Path]:
     """Rendered against asked-for stiffness: median and range over poses, axes and forces, one line per controller."""
-    figure, axes = plt.subplots(figsize=(COLUMN, 4.4), layout="constrained")
+    figure, axes = plt.subplots(figsize=(PAGE, 3.4 + 0.07 * len(study)), layout="constrained")
     within = 0
     for k, (name, result) in enumerate(study.items()):
         errors = _numbers(result["error_percent"])
         low, middle, high = _spread(errors)
         within += bool(np.abs(middle).max() <= EXACT)
         # Beside each other, or the ranges would hide one another.
-        place = np.array(result["setpoints"]) * 1.022 ** (k - (len(study) - 1) / 2)
+        place = np.array(result["setpoints"]) * 1.22 ** (k / len(study) - 0.5)
         axes.plot(place, middle, **look(k), lw=0.8, label=_label(name, errors))
         axes.vlines(place, low, high, color=look(k)["color"], lw=0.8)
     _percent_axis(axes, 1.0)
@@ -179,7 +179,7 @@ def _panels(count: int, height: float, **options: Any) -> tuple[Figure, Iterator
     return figure, iter(panels.flat[:count])
 
 
-LONGEST = 23
+LONGEST = 24
 """Letters of a name that fit above the narrowest panel."""
 
 
