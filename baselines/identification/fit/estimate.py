@@ -66,13 +66,13 @@ class Fit:
         return np.asarray(np.linalg.inv(self.jacobian.T @ self.jacobian))
 
 
-def search(problem: Problem, theta: Array, most: int, weights: int = MOST_WEIGHTS) -> Fit:
+def search(problem: Problem, theta: Array, most: int, weights: int | None = None) -> Fit:
     """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations, again while weights change: with
-    at most so many ``weights``."""
+    at most so many ``weights``, or ``MOST_WEIGHTS``."""
     low, high = problem.limits
     place = np.clip(theta, low + 1e-6, high - 1e-6)
     with problem.explained():
-        for left in reversed(range(weights)):
+        for left in reversed(range(weights or MOST_WEIGHTS)):
             if not np.isfinite(problem.residuals(place)).all():
                 raise ValueError(problem.disagreement())
             try:

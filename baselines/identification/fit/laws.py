@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from baselines.identification.fit.budget import Budget
-from baselines.identification.fit.estimate import MOST_WEIGHTS, Fit, begin, refine, search
+from baselines.identification.fit.estimate import Fit, begin, refine, search
 from baselines.identification.fit.free_parameters import FreeParameter, coordinates
 from baselines.identification.fit.problem import Problem, Tick
 from baselines.identification.log.trial import Trial
@@ -81,7 +81,7 @@ class Laws:
         if not self.chances:
             return f"{LAW} = {self.chosen}, as given: no other law was tried"
         worse = [law for law in self.chances if law != self.chosen and law not in self.rivals]
-        behind = f"{_listed(worse)} {'predicts' if len(worse) == 1 else 'predict'} windows that guided no fit worse"
+        behind = f"{_listed(worse)} {'predicts' if len(worse) == 1 else 'predict'} windows that guided no fit less well"
         chance = self.chances[self.chosen]
         if not self.rivals:
             sure = "above 0.999" if chance > 0.999 else f"{chance:.3f}"
@@ -111,7 +111,7 @@ class _Compared:
         self.scores: dict[str, Array] = {}
         self.failed: list[ValueError] = []
 
-    def add(self, law: str, start: Fit, weights: int = 1) -> None:
+    def add(self, law: str, start: Fit, weights: int | None = 1) -> None:
         """Search from another fit on under ``law``, which is left out where it comes to no end."""
         first, other = self._first, next(iter(self.fits.values()), None)
         try:
@@ -131,7 +131,7 @@ class _Compared:
         self._search(law, self.fits[law].problem, self.fits[law].theta, MORE, 1, None)
 
     def _search(
-        self, law: str, problem: Problem, theta: Array, most: int, weights: int, anew: tuple[Parameters, Array] | None
+        self, law: str, problem: Problem, theta: Array, most: int, weights: int | None, anew: tuple[Parameters, Array] | None
     ) -> None:
         try:
             with problem.windows.budget.part(SHARE), problem.explained():
@@ -184,7 +184,7 @@ def fit_law(
     first = begin(trial, owner, seed, free, tick)
     first.problem.windows.budget.left += Budget.of(trial).left
     compared = _Compared(trial, first, owner, tick)
-    compared.add(known, first, MOST_WEIGHTS)
+    compared.add(known, first, None)
     for other in COMPARED:
         if other != known:
             compared.add(other, compared.fits.get(known, first))
