@@ -107,11 +107,22 @@ def test_events_are_there_for_tensorboard_each_at_its_own_step(trained):
     assert set(events["validation/pooled_mm"]) == {point["steps"] for point in reached["curve"]}
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", *(pytest.param(name, marks=pytest.mark.slow) for name in ("sac", "tqc"))])
+@pytest.mark.parametrize(
+    "algorithm", ["ppo", *(pytest.param(name, marks=pytest.mark.slow) for name in ("recurrent-ppo", "sac", "tqc"))]
+)
 def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
     settings = replace(
-        BRIEF, algorithm=algorithm, steps=512, lanes=8, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8), validation_lanes=2
+        BRIEF,
+        algorithm=algorithm,
+        memory=4 * (algorithm == "recurrent-ppo"),
+        steps=512,
+        lanes=8,
+        batch=64,
+        epochs=1,
+        gradient_steps=1,
+        hidden=(8, 8),
+        validation_lanes=2,
     )
     for name, seed in (("one", 0), ("again", 0), ("other", 1)):
         reached = train(replace(settings, seed=seed), RESIDUAL, tmp_path / name)
