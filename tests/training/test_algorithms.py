@@ -1,5 +1,6 @@
 """Algorithms of Stable-Baselines3: each begins as the law, learns, and its network does what its own ``predict`` does."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -9,10 +10,14 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from agents.policy.controller import ResidualController
+from agents.policy.files import Policy, read_policy, save_policy
+from agents.policy.onnx_export import export_onnx
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, algorithm_of
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.model import make_model, network_of, unchecked_distributions
+from baselines.bench.evaluation import evaluate
 
 CIRCLE = "BirthSIM/CircleResidual-v2"
 TINY = TrainingSettings(CIRCLE, lanes=8, rollout=32, batch=64, epochs=2, gradient_steps=2, learning_rate=3e-3, hidden=(16, 16))
@@ -135,6 +140,24 @@ def test_a_recurrent_network_remembers_and_forgets_as_the_model_does():
         np.testing.assert_allclose(actions, expected, rtol=0, atol=3e-5)
         without.append(np.abs(taken.actions(rows) - expected).max())
     assert max(without) > 1e-3, "what it remembers matters"
+
+
+def test_a_recurrent_policy_is_a_folder_like_any_other_and_runs_compiled_in_a_controller(tmp_path):
+    """One period at a time in Python, its network asked at every tenth, and compiled: the same bits; and it is exported."""
+    residual = ResidualSettings("backstepping-force-first")
+    model, env, _ = made(MEMORY, residual, randomize=True)
+    model.learn(300)
+    with torch.no_grad():
+        model.policy.action_net.weight.mul_(0.5 / model.policy.action_net.weight.norm(dim=1).max())
+    trained = Policy(network_of(model.algorithm, model.policy, env), CIRCLE, residual, {})
+    save_policy(trained, tmp_path)
+    compiled = ResidualController(None, tmp_path)
+    function = ResidualController(None, read_policy(tmp_path).network.acting(), residual)
+    assert (compiled.is_compiled(), function.is_compiled()) == (True, False)
+    runs = [evaluate("BirthSIM/Circle-v2", one, "", 2, 5, duration=1.5) for one in (compiled, function, compiled)]
+    said = {json.dumps({name: list(values) for name, values in one.metrics.items()}) for one in runs}
+    assert len(said) == 1, "and an episode begins with an empty memory"
+    assert export_onnx(trained, tmp_path / "policy.onnx").observations > 0
 
 
 def test_sequences_that_begin_midway_are_learned_from_as_they_were_collected():

@@ -20,6 +20,13 @@ BUFFER = 300_000
 CRITIC = [128, 128]
 """Units of the critics' layers; assumed."""
 
+ENTROPY = 0.1
+"""What entropy is worth at the beginning, in rewards; later it is learned. Stable-Baselines3's 1 outweighs the rewards for
+thousands of updates, in which a policy learns to act at random; found by trial."""
+
+FOLLOWED = 0.02
+"""How far the target critics follow at an update; found by trial. With lanes there are few updates to a step."""
+
 RANDOM = 20
 """Steps of all lanes under random actions, before anything is learned; assumed."""
 
@@ -43,6 +50,8 @@ class OffPolicy(ByStableBaselines):
             "gradient_steps": settings.gradient_steps,
             "buffer_size": BUFFER,
             "learning_starts": RANDOM * settings.lanes,
+            "ent_coef": f"auto_{ENTROPY:g}",
+            "tau": FOLLOWED,
             "policy_kwargs": {**activation(settings), "net_arch": {"pi": list(settings.hidden), "qf": CRITIC}},
         }
 
