@@ -22,6 +22,8 @@ class RecurrentPPO(OnPolicy):
     """
 
     hyperparameters = MappingProxyType({"rollout": 32, "hidden": (64,), "memory": 32})
+    """Assumed; a batch is then 64 sequences."""
+
     takes = OnPolicy.takes | {"memory"}
 
     def complaint(self, settings: TrainingSettings) -> str:
