@@ -45,7 +45,7 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """An experiment and its algorithm, whose hyperparameters are its own where they are not given.
+    """An experiment and its algorithm, whose hyperparameters are its own where they are None.
 
     PPO uses ``rollout``, ``epochs`` and ``gae_lambda``, recurrent PPO also ``memory``, the cells of its policy's memory; SAC
     and TQC use ``gradient_steps``, per step of all lanes; the analytic policy gradient (apg) uses ``rollout``, its horizon,
