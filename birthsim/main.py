@@ -36,7 +36,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "study": Command("studies of the project, in a clone", "speed"),
     },
     "learn": {
-        "train": Command("policies by PPO, SAC, TQC or gradients", "--config circle --seeds 5 --out out/circle"),
+        "train": Command("policies by PPO, SAC and others, or by gradients", "--config circle --seeds 5 --out out/circle"),
         "distill": Command("policies with a memory, from teachers that know the rig", "--teacher out/told --out out/students"),
         "explain": Command("what a trained residual has learned", "--policy circle --no-pushes --out out/explain"),
     },

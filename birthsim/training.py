@@ -95,8 +95,8 @@ def train(
         The rig, as environments take it.
     **changes
         Fields of ``agents.TrainingSettings`` and ``agents.ResidualSettings`` instead of what the configuration says, such as
-        ``environment``, ``algorithm`` (``"ppo"``, ``"sac"``, ``"tqc"`` or ``"apg"``), ``steps`` (policy steps), ``law``,
-        ``authority`` (N).
+        ``environment``, ``algorithm`` (``"ppo"``, ``"recurrent-ppo"``, ``"sac"``, ``"tqc"`` or ``"apg"``, which brings its own
+        hyperparameters), ``steps`` (policy steps), ``law``, ``authority`` (N).
 
     Returns
     -------

@@ -35,6 +35,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "scenario": ("birthsim_env.parts.scenarios",),
     "hand": ("birthsim_env.parts.hands",),
     "policy": ("agents.policy.shipped",),
+    "algorithm": ("agents.training.algorithms",),
     "reader": ("birthsim_env.tables.readers",),
     "export": ("birthsim.exports",),
     "device": ("birthsim_env.episodes", "birthsim_build.device.episodes"),

@@ -8,18 +8,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from agents.residual.settings import ResidualSettings
+from agents.training.algorithm import HYPERPARAMETERS, Algorithm
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, make_plain, near, path_of, shown, whole_of
-from birthsim_env.registry import names
-
-STABLE_BASELINES = ("ppo", "sac", "tqc")
-ALGORITHMS = (*STABLE_BASELINES, "apg")
+from birthsim_env.registry import entry, names
 
 COUNTS = {
     "steps": (1, 10**10), "seed": (0, 2**32 - 1), "lanes": (1, 2**16), "rollout": (1, 2**16), "batch": (2, 2**20),
-    "epochs": (1, 1000), "gradient_steps": (1, 1000), "validation_lanes": (1, 2**16), "validations": (1, 10**4),
+    "epochs": (1, 1000), "gradient_steps": (1, 1000), "memory": (0, 2048), "validation_lanes": (1, 2**16),
+    "validations": (1, 10**4),
 }  # fmt: skip
 """Least and largest of what is counted; a batch of one has no spread to normalise its advantages by."""
 
@@ -30,7 +29,13 @@ TARGETS = ("spring", "impedance")
 """Where an end effector should be: on the compliant target (19), or where ``admittance``'s mass, damper and spring would be."""
 
 COLLECTED = 2**22
-"""Steps of all lanes that PPO keeps between updates: some hundred floats each."""
+"""Steps of all lanes that an algorithm keeps between updates: some hundred floats each."""
+
+SPECIAL: dict[str, Any] = {"target": TARGETS[0], "beside": (), "noise": 0.0, "memory": 0, "privileged": False}
+"""Settings that only some algorithms take, and what they are for the others."""
+
+OF_ALGORITHM: Any = None
+"""A setting that is what the algorithm says (``agents.training.algorithm.HYPERPARAMETERS``)."""
 
 FOLDER = Path(__file__).resolve().parent.parent / "configurations"
 
@@ -40,17 +45,18 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """An experiment and its algorithm.
+    """An experiment and its algorithm, whose hyperparameters are its own where they are None.
 
-    PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes; the analytic
-    policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount``. It alone takes another ``target``
-    than the spring, and worlds ``beside`` those of ``environment``, which share the lanes evenly: each an id, and after a space
-    the name of a hand where it is not the scenario's. It alone adds ``noise`` to actions, a normal one whose standard deviation
-    falls linearly to zero: within the overlap of valves a policy that drives them has no gradient without it. The learning rate
-    falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
-    ``until`` percent below that of the paper's law; with 100 it never ends early. Training draws rigs that oscillate more
-    easily than those of validation, by a ``margin`` (``agents.training.margin``). A ``privileged`` policy observes the true
-    parameters of the rig (``agents.residual.privileged``), and runs in no controller.
+    PPO uses ``rollout``, ``epochs`` and ``gae_lambda``, recurrent PPO also ``memory``, the cells of its policy's memory; SAC
+    and TQC use ``gradient_steps``, per step of all lanes; the analytic policy gradient (apg) uses ``rollout``, its horizon,
+    ``learning_rate`` and ``discount``. It alone takes another ``target`` than the spring, and worlds ``beside`` those of
+    ``environment``, which share the lanes evenly: each an id, and after a space the name of a hand where it is not the
+    scenario's. It alone adds ``noise`` to actions, a normal one whose standard deviation falls linearly to zero: within the
+    overlap of valves a policy that drives them has no gradient without it. The learning rate falls linearly to a hundredth. The
+    training ends early once the pooled settled error of its policy in validation is ``until`` percent below that of the paper's
+    law; with 100 it never ends early. Training draws rigs that oscillate more easily than those of validation, by a ``margin``
+    (``agents.training.margin``). A ``privileged`` policy observes the true parameters of the rig
+    (``agents.residual.privileged``), and runs in no controller.
     Raises ``ValueError`` naming what cannot be.
     """
 
@@ -60,16 +66,17 @@ class TrainingSettings:
     seed: int = 0
     sensors: str = "ideal"
     randomize: bool | str = True
-    lanes: int = 256
-    rollout: int = 16
-    batch: int = 2048
-    epochs: int = 2
-    gradient_steps: int = 4
-    learning_rate: float = 1e-3
-    discount: float = 0.96
-    gae_lambda: float = 0.95
-    log_std: float = -1.5
-    hidden: tuple[int, ...] = (64, 64)
+    lanes: int = OF_ALGORITHM
+    rollout: int = OF_ALGORITHM
+    batch: int = OF_ALGORITHM
+    epochs: int = OF_ALGORITHM
+    gradient_steps: int = OF_ALGORITHM
+    learning_rate: float = OF_ALGORITHM
+    discount: float = OF_ALGORITHM
+    gae_lambda: float = OF_ALGORITHM
+    log_std: float = OF_ALGORITHM
+    hidden: tuple[int, ...] = OF_ALGORITHM
+    memory: int = OF_ALGORITHM
     validation_lanes: int = 64
     validations: int = 6
     until: float = 100.0
@@ -81,13 +88,17 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         for name, allowed in (
-            ("algorithm", ALGORITHMS),
+            ("algorithm", tuple(names("algorithm"))),
             ("sensors", tuple(names("sensors"))),
             ("randomize", RANDOMIZE),
             ("privileged", (True, False)),
             ("target", TARGETS),
         ):
             one_of(name, getattr(self, name), allowed)
+        algorithm = algorithm_of(self.algorithm)
+        for name, value in algorithm.defaults().items():
+            if getattr(self, name) is OF_ALGORITHM:
+                object.__setattr__(self, name, value)
         if not isinstance(self.environment, str):
             raise ValueError(f"environment = {shown(self.environment)}; allowed: the id of a residual environment")
         for name, (few, many) in COUNTS.items():
@@ -107,8 +118,8 @@ class TrainingSettings:
         object.__setattr__(self, "hidden", tuple(widths))
         if not (isinstance(self.beside, tuple) and all(isinstance(one, str) for one in self.beside)):
             raise ValueError(f"beside = {shown(self.beside)}; allowed: ids of residual environments, with hands after a space")
-        for name, plain in (("target", TARGETS[0]), ("beside", ()), ("noise", 0.0)):
-            if self.algorithm != "apg" and getattr(self, name) != plain:
+        for name, plain in SPECIAL.items():
+            if name not in algorithm.takes and getattr(self, name) != plain:
                 raise ValueError(
                     f"{name} = {shown(getattr(self, name))} with algorithm = {self.algorithm!r}; allowed: {plain!r}"
                 )
@@ -118,9 +129,9 @@ class TrainingSettings:
                 raise ValueError(
                     f"{name} = {getattr(self, name)}; allowed: a multiple of {groups}, one part for each of the worlds"
                 )
-        if self.algorithm == "apg" and self.privileged:
-            raise ValueError("privileged = True with algorithm = 'apg'; allowed: False")
-        if self.algorithm in ("ppo", "apg") and self.lanes * self.rollout > COLLECTED:
+        if complaint := algorithm.complaint(self):
+            raise ValueError(complaint)
+        if algorithm.collects and self.lanes * self.rollout > COLLECTED:
             raise ValueError(
                 f"lanes = {self.lanes} with rollout = {self.rollout}; allowed: a product of at most {COLLECTED}, the steps "
                 "between two updates"
@@ -130,10 +141,21 @@ class TrainingSettings:
         """As JSON takes it."""
         return {**asdict(self), "hidden": list(self.hidden), "beside": list(self.beside)}
 
+    def without_algorithm(self) -> dict[str, Any]:
+        """The hyperparameters that are those of its algorithm, as ``OF_ALGORITHM``: another one takes its own instead."""
+        own = algorithm_of(self.algorithm).defaults()
+        return {name: OF_ALGORITHM for name in HYPERPARAMETERS if getattr(self, name) == own[name]}
+
     def worlds(self) -> list[tuple[str, dict[str, Any]]]:
         """The id of each kind of worlds, and its hand as an argument, where it is not the scenario's."""
         named = [one.partition(" ") for one in (self.environment, *self.beside)]
         return [(name, {"user_force": hand} if hand else {}) for name, _, hand in named]
+
+
+def algorithm_of(name: str) -> Algorithm:
+    """The algorithm of a name; raises ``ValueError`` where none is registered."""
+    made: Algorithm = entry("algorithm", name).made()
+    return made
 
 
 def configuration_names() -> list[str]:
@@ -167,10 +189,15 @@ def load_configuration(name: str | os.PathLike[str]) -> tuple[TrainingSettings, 
 
 
 def override(settings: S, **values: Any) -> S:
-    """``settings`` with other values, lists as tuples; raises ``ValueError`` for names that they have not."""
+    """``settings`` with other values, lists as tuples; raises ``ValueError`` for names that they have not.
+
+    Another algorithm brings its own hyperparameters, in the place of those that were the first one's.
+    """
     known = [field.name for field in fields(settings)]
     for name, value in values.items():
         if name not in known:
             raise ValueError(f"{in_line(name)} = {shown(value)} is unknown; allowed: {', '.join(known)}")
         values[name] = tuple(value) if isinstance(value, list) else value
+    if isinstance(settings, TrainingSettings) and values.get("algorithm", settings.algorithm) != settings.algorithm:
+        values = {**settings.without_algorithm(), **values}
     return replace(settings, **values)

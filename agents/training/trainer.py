@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import torch
@@ -15,29 +14,11 @@ from tqdm import tqdm
 from agents.policy.files import WEIGHTS
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.checkpoint import NAME as CHECKPOINT
-from agents.training.configuration import TrainingSettings
+from agents.training.configuration import TrainingSettings, algorithm_of
 from agents.training.events import EVENTS, events_in
 from agents.training.margin import widened
-from agents.training.policy_gradient import PolicyGradient
 from agents.training.reached import Reached, described
-from agents.training.sb3.learner import StableBaselines
 from birthsim_env.physics.rig.parameters import load_parameters
-
-
-class Learner(Protocol):
-    """What learns in the lanes of ``envs``."""
-
-    def __init__(self, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> None: ...
-
-    @property
-    def steps(self) -> int:
-        """Policy steps so far, of all lanes."""
-
-    def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
-        """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
-
-    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
-        """Learn to the end, with a validation and a checkpoint at equal intervals; ``began`` is when it was made, s."""
 
 
 def train(
@@ -73,8 +54,7 @@ def train(
         arguments |= ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()
         paper = made(settings.validation_lanes)
     about = described(settings, residual, checks[0].simulation.parameters)
-    kind: type[Learner] = PolicyGradient if settings.algorithm == "apg" else StableBaselines
-    learner = kind(settings, envs, folder)
+    learner = algorithm_of(settings.algorithm).learner(settings, envs, folder)
     began = time.perf_counter()
     past = learner.load(about)
     if past is not None:

@@ -15,7 +15,7 @@ from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Dict
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
-from birthsim.command_line.settings import CONTROLLER, ENV, HAND, SENSORS, TABLE, Configured
+from birthsim.command_line.settings import ALGORITHM, CONTROLLER, ENV, HAND, SENSORS, TABLE, Configured
 from birthsim.command_line.start import endings
 
 S = TypeVar("S")
@@ -78,12 +78,13 @@ def perform_with(name: str, settings: type[S], action: Callable[[S], None], exam
 def _named(settings: type) -> str:
     """What has a name and a command of these settings takes, for the end of its help; "" where it takes nothing of the kind."""
     marks = [mark for hint in get_type_hints(settings, include_extras=True).values() for mark in _marks(hint)]
-    if not any(mark in marks for mark in (CONTROLLER, ENV, SENSORS, HAND, TABLE)):
+    if not any(mark in marks for mark in (ALGORITHM, CONTROLLER, ENV, SENSORS, HAND, TABLE)):
         return ""
     from birthsim_env.parts.scenarios import environment_id  # these load what is listed
     from birthsim_env.registry import names
 
     lists: list[tuple[Parameter, str, Callable[[], list[str]]]] = [
+        (ALGORITHM, "algorithms", lambda: names("algorithm")),
         (CONTROLLER, "controllers", lambda: names("controller")),
         (CONTROLLER, "policies, as residual:circle", lambda: names("policy")),
         (ENV, "environments", lambda: [environment_id(name) for name in names("scenario")]),

@@ -81,6 +81,7 @@ Env = Annotated[str, ENV, Parameter(help="Environment.")]
 Seed = Annotated[int, whole(0, 2**32 - 1)]
 """A seed that NumPy and PyTorch take."""
 SENSORS = Parameter(group=WORLD, metavar="NAME", validator=named("sensors"))
+ALGORITHM = Parameter(metavar="NAME", validator=named("algorithm"))
 Sensors = Annotated[str, SENSORS, Parameter(help="Sensor model, one of those below.")]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
 RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from birthsim.command_line.settings import PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
+from birthsim.command_line.settings import ALGORITHM, PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
 
 CHANGES = ("algorithm", "steps", "sensors", "until", "law", "impedance", "authority")
 """Options that are called as the settings of a training that they change."""
@@ -14,7 +14,7 @@ CHANGES = ("algorithm", "steps", "sensors", "until", "law", "impedance", "author
 
 @dataclass(kw_only=True)
 class Settings:
-    """Train residual policies on top of a controller, by PPO, SAC, TQC, or gradients through the loop (apg).
+    """Train residual policies on top of a controller, by reinforcement learning or by gradients through the loop.
 
     Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
     whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
@@ -23,8 +23,8 @@ class Settings:
 
     config: Annotated[str, Parameter(metavar="NAME")] = "circle"
     """A configuration of agents/configurations, such as circle_quick, or a TOML file."""
-    algorithm: Literal["ppo", "sac", "tqc", "apg"] | None = None
-    """How it learns."""
+    algorithm: Annotated[str | None, ALGORITHM] = None
+    """How it learns, one of those below; hyperparameters that the configuration does not say are its own."""
     law: Annotated[str | None, Parameter(metavar="NAME")] = None
     """Controller underneath, such as backstepping-force-first; none: the policy drives the valves by itself."""
     impedance: Literal["fixed", "variable_kp", "variable"] | None = None

@@ -92,7 +92,7 @@ def test_numbers_of_numpy_are_numbers_and_nothing_else_is(name):
         for kind in kinds:
             use(kind(value))
     for wrong in NO_NUMBERS:
-        if not (wrong is None and name in ("duration", "stiffness", "damping_ratio")):
+        if not (wrong is None and name in ("duration", "stiffness", "damping_ratio", "learning_rate")):
             with pytest.raises(ValueError, match="allowed: "):
                 use(wrong)
 

@@ -15,10 +15,10 @@ from agents.policy.files import FORMAT, WEIGHTS, read_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.policy.seeds import policy_folders
 from agents.training import checkpoint
-from agents.training.configuration import TrainingSettings
+from agents.training.configuration import TrainingSettings, algorithm_of
 from agents.training.sb3.adapter import SB3VecEnv
-from agents.training.sb3.algorithms import make_model
 from agents.training.sb3.checkpoint import load_checkpoint, save_checkpoint
+from agents.training.sb3.model import make_model
 from tests.fuzz.strategies import altered, composite, damaged, json_texts, odd_arrays, sampled
 from tests.fuzz.watched import cases, watched
 
@@ -71,7 +71,7 @@ def trained(tmp_path_factory):
     env = VecNormalize(SB3VecEnv(gymnasium.make_vec(TINY.environment, num_envs=2, autoreset_mode="SameStep")))
     env.seed(0)
     env.reset()
-    model = make_model(TINY, env)
+    model = make_model(algorithm_of(TINY.algorithm), TINY, env)
     model.learn(64)
     save_checkpoint(folder, model, env, SETTINGS, PAST)
     load_checkpoint(folder, model, env, SETTINGS)

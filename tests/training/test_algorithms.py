@@ -1,5 +1,6 @@
-"""PPO, SAC and TQC: each begins as the law, learns, and its NumPy network does what its own ``predict`` does."""
+"""Algorithms of Stable-Baselines3: each begins as the law, learns, and its network does what its own ``predict`` does."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -9,14 +10,20 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from agents.policy.controller import ResidualController
+from agents.policy.files import Policy, read_policy, save_policy
+from agents.policy.onnx_export import export_onnx
 from agents.residual.settings import ResidualSettings
-from agents.training.configuration import STABLE_BASELINES, TrainingSettings
+from agents.training.configuration import TrainingSettings, algorithm_of
 from agents.training.sb3.adapter import SB3VecEnv
-from agents.training.sb3.algorithms import make_model, network_of, unchecked_distributions
+from agents.training.sb3.model import make_model, network_of, unchecked_distributions
+from baselines.bench.evaluation import evaluate
 
 CIRCLE = "BirthSIM/CircleResidual-v2"
 TINY = TrainingSettings(CIRCLE, lanes=8, rollout=32, batch=64, epochs=2, gradient_steps=2, learning_rate=3e-3, hidden=(16, 16))
 VARIABLE = ResidualSettings(impedance="variable")
+FEEDFORWARD = ("ppo", "sac", "tqc")
+MEMORY = replace(TINY, algorithm="recurrent-ppo", memory=12)
 
 
 def made(settings, residual=VARIABLE, **arguments):
@@ -24,7 +31,7 @@ def made(settings, residual=VARIABLE, **arguments):
     torch.set_num_threads(1)
     native = gymnasium.make_vec(CIRCLE, num_envs=settings.lanes, autoreset_mode="SameStep", **residual.to_dict(), **arguments)
     env = VecNormalize(SB3VecEnv(native), gamma=settings.discount)
-    return make_model(settings, env), env, native
+    return make_model(algorithm_of(settings.algorithm), settings, env), env, native
 
 
 def observations(native, size, steps=40, seed=77):
@@ -53,22 +60,22 @@ def rounding(network, inputs):
     return error + 4 * unit
 
 
-@pytest.mark.parametrize("algorithm", STABLE_BASELINES)
+@pytest.mark.parametrize("algorithm", FEEDFORWARD)
 def test_before_it_has_learned_a_policy_says_nothing_and_explores_around_that(algorithm):
     model, env, native = made(replace(TINY, algorithm=algorithm, log_std=-1.0), randomize=True)
     rows, far = observations(native, 5)
     for inputs in (rows, far):
-        np.testing.assert_array_equal(network_of(model.policy, env).actions(inputs), 0)
+        np.testing.assert_array_equal(network_of(model.algorithm, model.policy, env).actions(inputs), 0)
         np.testing.assert_array_equal(model.predict(env.normalize_obs(inputs), deterministic=True)[0], 0)
     tried = model.predict(env.normalize_obs(rows), deterministic=False)[0]
     expected = np.tanh(np.exp(-1) * np.random.default_rng(0).normal(size=100_000)).std() if algorithm != "ppo" else np.exp(-1)
     assert tried.std() == pytest.approx(expected, rel=0.1)
     assert abs(tried.mean()) < 0.05
     # The layers below the last one are random: there is something to learn with.
-    assert all(weight.any() for weight, _ in network_of(model.policy, env).layers[:-1])
+    assert all(weight.any() for weight, _ in network_of(model.algorithm, model.policy, env).layers[:-1])
 
 
-@pytest.mark.parametrize("algorithm", STABLE_BASELINES)
+@pytest.mark.parametrize("algorithm", FEEDFORWARD)
 @pytest.mark.parametrize("hidden", [(16, 16), (8,), (5, 6, 7)])
 def test_the_network_taken_from_a_model_does_what_the_model_predicts(algorithm, hidden):
     # Without randomisation some inputs never change: their variance is almost nothing, and rounding weighs most.
@@ -78,7 +85,7 @@ def test_the_network_taken_from_a_model_does_what_the_model_predicts(algorithm, 
     with torch.no_grad():
         # As a trained network: actions over most of [-1, 1].
         last.weight.mul_(0.5 / last.weight.norm(dim=1).max())
-    taken = network_of(model.policy, env)
+    taken = network_of(model.algorithm, model.policy, env)
     assert taken.squashed == (algorithm != "ppo")
     assert len(taken.layers) == len(hidden) + 1
     rows, far = observations(native, 5)
@@ -90,7 +97,7 @@ def test_the_network_taken_from_a_model_does_what_the_model_predicts(algorithm, 
     assert (np.abs(taken.actions(rows)) < 1).mean() > 0.5
 
 
-@pytest.mark.parametrize("algorithm", STABLE_BASELINES)
+@pytest.mark.parametrize("algorithm", FEEDFORWARD)
 def test_settings_reach_the_algorithm(algorithm):
     settings = replace(TINY, algorithm=algorithm, discount=0.9, learning_rate=2e-3, seed=5)
     model, _, _ = made(settings)
@@ -102,6 +109,74 @@ def test_settings_reach_the_algorithm(algorithm):
         assert (model.gradient_steps, model.train_freq.frequency) == (2, 1)
         # Random actions fill the memory for twenty steps of all lanes.
         assert model.learning_starts == 160
+
+
+def sequences(native, size, steps=30):
+    """Observations (T, N, D) of all lanes on the way under random actions, and where episodes begin (T, N), also midway."""
+    rng = np.random.default_rng(0)
+    seen = [native.reset(seed=77)[0]]
+    seen += [native.step(rng.uniform(-1, 1, (native.num_envs, size)).astype(np.float32))[0] for _ in range(steps - 1)]
+    begins = rng.random((steps, native.num_envs)) < 0.1
+    begins[0] = True
+    return np.stack(seen), begins
+
+
+def test_a_recurrent_network_remembers_and_forgets_as_the_model_does():
+    model, env, native = made(MEMORY, randomize=True)
+    seen, begins = sequences(native, 5)
+    np.testing.assert_array_equal(network_of(model.algorithm, model.policy, env).actions(seen[0]), 0)
+    model.learn(300)
+    with torch.no_grad():
+        last = model.policy.action_net
+        last.weight.mul_(0.5 / last.weight.norm(dim=1).max())
+    taken = network_of(model.algorithm, model.policy, env)
+    assert (taken.cells, len(taken.layers), taken.squashed) == (12, 3, False)
+    acts, state, without = taken.acting(), None, []
+    for rows, begun in zip(seen, begins, strict=True):
+        expected, state = model.predict(env.normalize_obs(rows), state, begun, deterministic=True)
+        acts.reset(begun)
+        actions = acts(rows)
+        # Thirty steps of sums over 44 numbers in singles, of which a gate hands on less than it got.
+        np.testing.assert_allclose(actions, expected, rtol=0, atol=3e-5)
+        without.append(np.abs(taken.actions(rows) - expected).max())
+    assert max(without) > 1e-3, "what it remembers matters"
+
+
+def test_a_recurrent_policy_is_a_folder_like_any_other_and_runs_compiled_in_a_controller(tmp_path):
+    """One period at a time in Python, its network asked at every tenth, and compiled: the same bits; and it is exported."""
+    residual = ResidualSettings("backstepping-force-first")
+    model, env, _ = made(MEMORY, residual, randomize=True)
+    model.learn(300)
+    with torch.no_grad():
+        model.policy.action_net.weight.mul_(0.5 / model.policy.action_net.weight.norm(dim=1).max())
+    trained = Policy(network_of(model.algorithm, model.policy, env), CIRCLE, residual, {})
+    save_policy(trained, tmp_path)
+    compiled = ResidualController(None, tmp_path)
+    function = ResidualController(None, read_policy(tmp_path).network.acting(), residual)
+    assert (compiled.is_compiled(), function.is_compiled()) == (True, False)
+    runs = [evaluate("BirthSIM/Circle-v2", one, "", 2, 5, duration=1.5) for one in (compiled, function, compiled)]
+    said = {json.dumps({name: list(values) for name, values in one.metrics.items()}) for one in runs}
+    assert len(said) == 1, "and an episode begins with an empty memory"
+    assert export_onnx(trained, tmp_path / "policy.onnx").observations > 0
+
+
+def test_sequences_that_begin_midway_are_learned_from_as_they_were_collected():
+    """The buffer cuts what was collected where episodes begin: the policy then says again what it said step by step."""
+    model, _, native = made(replace(MEMORY, lanes=3, rollout=64, batch=77), duration=0.3)
+    model.learn(64 * 3 * 2)
+    assert native.steps < 64, "episodes begin inside a rollout"
+    buffer, compared = model.rollout_buffer, 0
+    model.train = lambda: None
+    model.learn(64 * 3, reset_num_timesteps=False)
+    for batch in buffer.get(77):
+        values, said, _ = model.policy.evaluate_actions(
+            batch.observations, batch.actions, batch.lstm_states, batch.episode_starts
+        )
+        counted = batch.mask > 0
+        torch.testing.assert_close(said[counted], batch.old_log_prob[counted], rtol=0, atol=1e-4)
+        torch.testing.assert_close(values.flatten()[counted], batch.old_values[counted], rtol=0, atol=1e-4)
+        compared += int(counted.sum())
+    assert compared == 64 * 3
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])

@@ -15,10 +15,11 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from agents.training.checkpoint import FORMAT, NAME
+from agents.training.configuration import algorithm_of, override
 from agents.training.reached import described
 from agents.training.sb3.adapter import SB3VecEnv
-from agents.training.sb3.algorithms import make_model
 from agents.training.sb3.checkpoint import load_checkpoint, save_checkpoint
+from agents.training.sb3.model import make_model
 from agents.training.trainer import train
 from birthsim_env import Parameters
 from tests.residual.policies import Trap
@@ -36,7 +37,8 @@ def new(algorithm="ppo", seed=0):
     env = VecNormalize(SB3VecEnv(gymnasium.make_vec(PROBE, num_envs=TINY.lanes, **arguments)))
     env.seed(seed)
     env.reset()
-    return make_model(replace(TINY, algorithm=algorithm, seed=seed), env), env
+    settings = override(TINY, algorithm=algorithm, seed=seed)
+    return make_model(algorithm_of(algorithm), settings, env), env
 
 
 def test_a_damaged_checkpoint_is_refused_and_nothing_is_unpickled(tmp_path):

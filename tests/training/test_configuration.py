@@ -10,7 +10,14 @@ import torch
 import yaml
 
 from agents.residual.settings import ResidualSettings
-from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration
+from agents.training.configuration import (
+    FOLDER,
+    TrainingSettings,
+    algorithm_of,
+    configuration_names,
+    load_configuration,
+    override,
+)
 from agents.training.margin import CALMING, EXCITING, widened
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.scenarios import environment_id, studied_scenarios
@@ -33,13 +40,14 @@ def test_every_configuration_of_the_package_says_what_its_file_says_and_can_be_m
     for table, settings in (("training", training), ("residual", residual)):
         for key, value in content.get(table, {}).items():
             assert settings.to_dict()[key] == value
-        for key, value in type(settings)().to_dict().items():
+        plain = type(settings)(**({"algorithm": settings.algorithm} if table == "training" else {}))
+        for key, value in plain.to_dict().items():
             assert key in content.get(table, {}) or settings.to_dict()[key] == value, "what is not said is the default"
     arguments = {"sensors": training.sensors, "randomize": training.randomize, **residual.to_dict()}
     env = gymnasium.make_vec(training.environment, num_envs=1, **arguments)
     assert env.single_action_space.shape == (residual.size,)
-    # PPO's minibatches are whole parts of what it collects.
-    assert training.algorithm != "ppo" or training.lanes * training.rollout % training.batch == 0
+    # Minibatches are whole parts of what is collected.
+    assert "ppo" not in training.algorithm or training.lanes * training.rollout % training.batch == 0
     assert json.loads(json.dumps(training.to_dict())) == training.to_dict()
 
 
@@ -64,6 +72,16 @@ def test_a_file_of_ones_own_says_only_what_differs(tmp_path):
     (tmp_path / "probe.toml").write_text("[training]\nsteps = 7\n")
     assert load_configuration(tmp_path / "probe.toml")[0].steps == 7
     assert load_configuration("probe")[0].steps != 7
+
+
+def test_another_algorithm_brings_its_own_hyperparameters_and_leaves_what_a_configuration_says():
+    lab, own = load_configuration("circle_lab")[0], algorithm_of("sac").defaults()
+    changed = override(lab, algorithm="sac", batch=512)
+    assert (changed.learning_rate, changed.batch) == (lab.learning_rate, 512), "said by the file, and by the call"
+    assert (changed.lanes, changed.gradient_steps, changed.memory) == (own["lanes"], own["gradient_steps"], 0)
+    assert own["lanes"] != lab.lanes
+    assert override(changed, algorithm="recurrent-ppo").memory == algorithm_of("recurrent-ppo").defaults()["memory"] > 0
+    assert override(lab, algorithm="ppo") == lab
 
 
 @pytest.mark.parametrize("name", sorted(studied_scenarios()))

@@ -49,6 +49,7 @@ SLOW = pytest.mark.slow
 UPDATE = (policy_gradient.PolicyGradient, "_update", 60)
 """Some way beyond the validation half way."""
 SAC = replace(TINY, algorithm="sac", steps=384)
+RECURRENT = replace(TINY, algorithm="recurrent-ppo", memory=6)
 LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v2")
 
 
@@ -61,6 +62,7 @@ LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v2")
         # The first 160 steps are drawn from the space of actions.
         pytest.param(SAC, RESIDUAL, [(*STEP, 10), (*STEP, 40), (*CHECK, 4)], marks=SLOW, id="sac"),
         pytest.param(replace(TINY, algorithm="tqc", steps=256), RESIDUAL, [(*STEP, 30)], marks=SLOW, id="tqc"),
+        pytest.param(RECURRENT, RESIDUAL, [(*STEP, 70), (*CHECK, 5)], id="recurrent ppo, two deaths"),
         pytest.param(SHORT, PURE, [UPDATE], marks=SLOW, id="apg"),
         pytest.param(BESIDE, INFORMED, [UPDATE], marks=SLOW, id="apg, informed"),
     ],

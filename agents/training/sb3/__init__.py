@@ -1,1 +1,1 @@
-"""Training by Stable-Baselines3: PPO, SAC and TQC."""
+"""Training by Stable-Baselines3: what PPO, recurrent PPO, SAC and TQC have in common."""

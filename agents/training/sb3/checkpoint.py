@@ -12,13 +12,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.training.checkpoint import read_checkpoint, require_array, require_moments, tensors, write_checkpoint
 from agents.training.sb3.adapter import SB3VecEnv
-from birthsim_env.physics.rig.values import shown
 from birthsim_env.restored import is_beyond
 from birthsim_env.state import State
-
-REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-"""Arrays in which SAC and TQC remember past steps."""
-
 
 FREE = ("past", "state", "lanes", "memory", "last", "random")
 """Keys below which ``_restore``, or what it calls, looks itself: what optimizers remember, lanes, and what grows."""
@@ -41,7 +36,7 @@ def _content(model: Any, env: VecNormalize, past: dict[str, Any], lanes: State) 
         "returns": env.returns,
         "last": [model._last_obs, model._last_episode_starts, model._last_original_obs],
         "lanes": lanes,
-        "memory": _memory(model),
+        "memory": model.algorithm.carried(model),
         "random": [
             torch.get_rng_state(),
             np.random.get_state(legacy=False),  # noqa: NPY002  Stable-Baselines3 draws its batches from it
@@ -90,7 +85,7 @@ def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str
         running.mean, running.var, running.count = content[name]  # type: ignore[union-attr]
     env.returns = content["returns"]
     model._last_obs, model._last_episode_starts, model._last_original_obs = content["last"]
-    _remember(model, content["memory"])
+    model.algorithm.carry(model, content["memory"])
     of_torch, of_numpy, of_actions = content["random"]
     if is_beyond(of_numpy) or is_beyond(of_actions):
         raise ValueError("random: a generator stands beyond its table")
@@ -98,32 +93,6 @@ def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str
     np.random.set_state(of_numpy)  # noqa: NPY002
     model.action_space.np_random.bit_generator.state = of_actions
     return past
-
-
-def _remember(model: Any, memory: dict[str, Any] | None) -> None:
-    """Put back what SAC and TQC remember of past steps; the next one is written at ``pos``."""
-    buffer = getattr(model, "replay_buffer", None)
-    if buffer is None or memory is None:
-        if (buffer is None) is not (memory is None):
-            raise ValueError("memory: there for algorithms that remember past steps, and for no others")
-        return
-    pos, full = memory["pos"], memory["full"]
-    if type(pos) is not int or type(full) is not bool or not 0 <= pos < buffer.buffer_size:
-        raise ValueError(f"memory: pos is {shown(pos)}, full is {shown(full)}; allowed: a position of {buffer.buffer_size}")
-    for name in REMEMBERED:
-        own = getattr(buffer, name)
-        require_array(f"memory/{name}", memory[name], (buffer.buffer_size if full else pos, *own.shape[1:]))
-        own[: len(memory[name])] = memory[name]
-    buffer.pos, buffer.full = pos, full
-
-
-def _memory(model: Any) -> dict[str, Any] | None:
-    """What SAC and TQC remember of past steps."""
-    buffer = getattr(model, "replay_buffer", None)
-    if buffer is None:
-        return None
-    arrays = {name: getattr(buffer, name)[: buffer.size()] for name in REMEMBERED}
-    return {"pos": int(buffer.pos), "full": bool(buffer.full), **arrays}
 
 
 def _adapter(env: Any) -> SB3VecEnv:

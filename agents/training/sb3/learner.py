@@ -13,8 +13,9 @@ from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS
 from agents.training.reached import Reached
 from agents.training.sb3.adapter import SB3VecEnv
-from agents.training.sb3.algorithms import make_model, unchecked_distributions
+from agents.training.sb3.algorithm import ByStableBaselines
 from agents.training.sb3.checkpoint import load_checkpoint
+from agents.training.sb3.model import make_model, unchecked_distributions
 from agents.training.sb3.monitor import Monitor
 from agents.training.sb3.privileged import Privileged
 from agents.training.sb3.shifted_reward import ShiftedReward
@@ -22,9 +23,9 @@ from agents.training.validation import SEED_SPACING, TRAINING_SEED
 
 
 class StableBaselines:
-    """PPO, SAC or TQC in the lanes of the only one of ``envs``."""
+    """An algorithm in the lanes of the only one of ``envs``."""
 
-    def __init__(self, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> None:
+    def __init__(self, algorithm: ByStableBaselines, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> None:
         (env,) = envs
         self._env, self._folder = SB3VecEnv(env, staggered=True), folder
         self._settings = settings
@@ -34,7 +35,7 @@ class StableBaselines:
         per_step = simulation.periods * simulation.period / 0.01
         paid = ShiftedReward(seen, per_step, settings.discount) if settings.discount < 1 else seen
         self._normalized = VecNormalize(paid, gamma=settings.discount)
-        self._model = make_model(settings, self._normalized, str(folder / EVENTS))
+        self._model = make_model(algorithm, settings, self._normalized, str(folder / EVENTS))
         self._normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
 
     @property

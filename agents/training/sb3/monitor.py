@@ -11,8 +11,8 @@ from tqdm import tqdm
 
 from agents.training.reached import Reached
 from agents.training.sb3.adapter import SB3VecEnv
-from agents.training.sb3.algorithms import network_of
 from agents.training.sb3.checkpoint import save_checkpoint
+from agents.training.sb3.model import network_of
 from agents.training.time_split import split
 
 
@@ -54,8 +54,8 @@ class Monitor(BaseCallback):
 
     def _check(self) -> None:
         began, reached = time.perf_counter(), self.reached
-        average: Any = self.model.average  # type: ignore[attr-defined]
-        network = network_of(average.module, self.training_env)  # type: ignore[arg-type]
+        model: Any = self.model
+        network = network_of(model.algorithm, model.average.module, self.training_env)  # type: ignore[arg-type]
         metrics = reached.validate(network)
         self._validating += time.perf_counter() - began
         seconds = self._before + time.perf_counter() - self._started
@@ -68,6 +68,6 @@ class Monitor(BaseCallback):
             self.logger.record(name, value)
         self.logger.dump(self.num_timesteps)
         self._bar.set_postfix_str(reached.words(metrics))
-        save_checkpoint(self._folder, self.model, self.training_env, reached.describe(), reached.past())  # type: ignore[arg-type]
+        save_checkpoint(self._folder, model, self.training_env, reached.describe(), reached.past())  # type: ignore[arg-type]
         if best:
             reached.keep()
