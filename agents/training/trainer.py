@@ -21,7 +21,6 @@ from agents.training.margin import widened
 from agents.training.policy_gradient import PolicyGradient
 from agents.training.reached import Reached, described
 from agents.training.sb3.learner import StableBaselines
-from birthsim_env.physics.rig.parameters import load_parameters
 
 
 class Learner(Protocol):
@@ -58,7 +57,7 @@ def train(
             if (folder / name).exists():
                 raise ValueError(f"{str(folder)!r} has {name} but not its {CHECKPOINT}; allowed: another folder")
     torch.set_num_threads(1)
-    rig = load_parameters(parameters)
+    rig = settings.rig(parameters)
     arguments = {
         "sensors": settings.sensors, "randomize": settings.randomize, **residual.to_dict(),
         "autoreset_mode": AutoresetMode.SAME_STEP,
