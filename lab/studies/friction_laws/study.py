@@ -14,7 +14,7 @@ from baselines.work.tasks import Task
 from birthsim_env.parts.drawn.frictions import with_friction
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.registry import entry, names, register
+from birthsim_env.registry import names, register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
@@ -122,16 +122,12 @@ def _shown(content: Content) -> dict[str, str]:
         for friction in settings["friction"]:
             rows.append([f"`{friction}`", *(cells(by[friction][metric]) for by in found.values())])
         tables.append(f"{head[0].upper()}{head[1:]}:\n\n{markdown(rows)}")
-    sweep = [["friction", "plants have", "law", "source"]]
-    for friction in settings["friction"]:
-        one = entry("friction", friction)
-        sweep.append([f"`{friction}`", one.about, ", ".join(f"`{law}`" for law in one.made.laws), one.made.source])
     said = (
         f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS} sensors, rigs drawn. Cells: median, 90th percentile; as "
         f"expected is `{ASSUMED}`, worst the friction with the largest 90th percentile."
     )
     summary = f"{said} {information.LEGEND}\n\n{markdown(whole)}\n"
-    return {"friction-laws.md": summary, "friction-laws-each.md": "\n\n".join([*tables, markdown(sweep)]) + "\n"}
+    return {"friction-laws.md": summary, "friction-laws-each.md": "\n\n".join(tables) + "\n"}
 
 
 STUDY = Study(
