@@ -143,3 +143,26 @@ def test_a_law_that_the_rigs_steps_do_not_follow_is_refused():
     stiff = {"parameters": {"friction": {"sign_speed": 0.001}}, "randomize": {LAW: ("lugre", "coulomb")}}
     with pytest.raises(ValueError, match=r"some of the rigs drawn are impossible: Mechanics\.mass"):
         gymnasium.make("BirthSIM/Circle-v2", **{**stiff, "randomize": {**stiff["randomize"], "mechanics.mass": (1.0, 3.0)}})
+
+
+def test_lanes_of_several_laws_have_the_bits_of_single_environments_while_laws_come_and_go():
+    """Seed 6 draws generalised Maxwell slip in its first episode and none in the next: the kernel changes on the way."""
+    given = {"parameters": {"randomize": {"friction": "drawn"}}, "randomize": True, "duration": 0.1}
+    envs = gymnasium.make_vec("BirthSIM/Probe-v3", num_envs=4, autoreset_mode="SameStep", **given)
+    envs.reset(seed=5)
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (15, 4, 4)).astype(np.float32)
+    states, slips = [], []
+    for action in actions:
+        envs.step(action)
+        states.append(envs.simulation.plant.state.copy())
+        slips.append(envs.simulation.plant.lane_parameters[at.GMS].any())
+    assert slips[0]
+    assert not slips[-1]
+    for lane in range(4):
+        env = gymnasium.make("BirthSIM/Probe-v3", **given)
+        env.reset(seed=5 + lane)
+        for action, state in zip(actions, states, strict=True):
+            *_, terminated, truncated, _ = env.step(action[lane])
+            if terminated or truncated:
+                env.reset()
+            np.testing.assert_array_equal(env.unwrapped.simulation.plant.state[:, 0], state[:, lane])
