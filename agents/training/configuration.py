@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import one_of
-from birthsim_env.parts.drawn.frictions import WITHOUT_ADJOINT, with_friction
+from birthsim_env.parts.drawn.frictions import OPTIONAL, with_friction
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.reading import read_toml
@@ -141,11 +141,10 @@ class TrainingSettings:
                 f"friction = {self.friction!r} with randomize = {self.randomize!r}; allowed: randomize = True or "
                 "'plant', which draw rigs"
             )
-        if self.algorithm == "apg" and WITHOUT_ADJOINT in laws[self.friction]:
-            others = ", ".join(repr(name) for name in laws if WITHOUT_ADJOINT not in laws[name])
+        if self.algorithm == "apg" and OPTIONAL in laws[self.friction]:
+            others = ", ".join(repr(name) for name in laws if OPTIONAL not in laws[name])
             raise ValueError(
-                f"friction = {self.friction!r} with algorithm = 'apg', though {WITHOUT_ADJOINT} has no gradients; "
-                f"allowed: {others}"
+                f"friction = {self.friction!r} with algorithm = 'apg', though {OPTIONAL} has no gradients; allowed: {others}"
             )
 
     def rig(self, parameters: Any = None) -> Parameters:

@@ -166,3 +166,27 @@ def test_lanes_of_several_laws_have_the_bits_of_single_environments_while_laws_c
             if terminated or truncated:
                 env.reset()
             np.testing.assert_array_equal(env.unwrapped.simulation.plant.state[:, 0], state[:, lane])
+
+
+def test_a_device_refuses_a_law_with_states_that_the_rig_has_not():
+    with pytest.raises(ValueError, match=r"friction\.law drawn from lugre, .*, gms; allowed on a device: all but gms"):
+        gymnasium.make_vec(
+            "BirthSIM/Probe-v3", num_envs=2, device="host", randomize=True, parameters={"randomize": {"friction": "drawn"}}
+        )
+
+
+def test_gradients_refuse_an_episode_that_draws_such_a_law():
+    """One that comes later than the first, when gradients were asked for."""
+    env = gymnasium.make("BirthSIM/Probe-v3", randomize={LAW: ("lugre", "gms")}, duration=0.02).unwrapped
+    for seed in range(20):
+        env.reset(seed=seed)
+        if env.simulation.plant.lane_parameters[at.GMS, 0] == 0.0:
+            break
+    env.record()
+    env.step(np.zeros(4, np.float32))
+    for _ in range(20):
+        env.reset()
+        if env.simulation.plant.lane_parameters[at.GMS, 0] == 1.0:
+            break
+    with pytest.raises(ValueError, match=r"gradients of a rig with one of .*'gms'"):
+        env.step(np.zeros(4, np.float32))

@@ -19,8 +19,9 @@ from birthsim_env.registry import entries, entry, register
 LAW, RATIO, STIFFNESS = "friction.law", "friction.static_ratio", "friction.bristle_stiffness"
 DAMPING, STRIBECK = "friction.bristle_damping", "friction.stribeck_speed"
 
-WITHOUT_ADJOINT = "gms"
-"""The law that gradients do not know: it has states of its own (``physics.options``)."""
+OPTIONAL = "gms"
+"""The law that is an option of the plant (``physics.options``), with states of its own: gradients do not know it, and devices
+only where the rig as described has it."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ _SWEEP: dict[str, tuple[str, FrictionWorld]] = {
     ),
     "drawn": (
         "One of all laws, and all that is in doubt of it drawn.",
-        FrictionWorld(("lugre", "elasto_plastic", "coulomb", WITHOUT_ADJOINT), _ANY, "those above"),
+        FrictionWorld(("lugre", "elasto_plastic", "coulomb", OPTIONAL), _ANY, "those above"),
     ),
     "drawn-smooth": (
         "As drawn, but for generalised Maxwell slip, which has no gradients.",
