@@ -17,7 +17,7 @@ from birthsim.command_line.settings import JOBS_AT_MOST
 from birthsim.command_line.worlds import check_environment, check_world
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, write_json
-from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_count, near, path_of, shown
 
 
@@ -155,7 +155,7 @@ def plan(
     residual = override(residual, **{name: value for name, value in changes.items() if name in own})
     given = {} if seed is None else {"seed": seed}
     training = override(training, **given, **{name: value for name, value in changes.items() if name not in own})
-    rig = load_parameters(parameters)
+    rig = training.rig(parameters)
     for name, hand in training.worlds():
         check_environment(name, residual=True, given="environment =")
         check_world(name, parameters=rig, randomize=training.randomize, sensors=training.sensors, **hand)

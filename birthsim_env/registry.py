@@ -34,6 +34,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "sensors": ("birthsim_env.parts.sensors",),
     "scenario": ("birthsim_env.parts.scenarios",),
     "hand": ("birthsim_env.parts.hands",),
+    "friction": ("birthsim_env.parts.drawn.frictions",),
     "policy": ("agents.policy.shipped",),
     "algorithm": ("agents.training.algorithms",),
     "reader": ("birthsim_env.tables.readers",),

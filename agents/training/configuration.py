@@ -10,7 +10,9 @@ from typing import Any, TypeVar
 from agents.residual.settings import ResidualSettings
 from agents.training.algorithm import HYPERPARAMETERS, Algorithm
 from birthsim_env.assembly import one_of
+from birthsim_env.parts.drawn.frictions import with_friction
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, make_plain, near, path_of, shown, whole_of
 from birthsim_env.registry import entry, names
@@ -56,7 +58,8 @@ class TrainingSettings:
     training ends early once the pooled settled error of its policy in validation is ``until`` percent below that of the paper's
     law; with 100 it never ends early. Training draws rigs that oscillate more easily than those of validation, by a ``margin``
     (``agents.training.margin``). A ``privileged`` policy observes the true parameters of the rig
-    (``agents.residual.privileged``), and runs in no controller.
+    (``agents.residual.privileged``), and runs in no controller. ``friction`` names what the friction of rigs is drawn from, in
+    training and in validation (``parts.drawn.frictions``).
     Raises ``ValueError`` naming what cannot be.
     """
 
@@ -85,6 +88,7 @@ class TrainingSettings:
     beside: tuple[str, ...] = ()
     margin: float = 0.0
     noise: float = 0.0
+    friction: str = ""
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -129,6 +133,7 @@ class TrainingSettings:
                 raise ValueError(
                     f"{name} = {getattr(self, name)}; allowed: a multiple of {groups}, one part for each of the worlds"
                 )
+        self._check_friction()
         if complaint := algorithm.complaint(self):
             raise ValueError(complaint)
         if algorithm.collects and self.lanes * self.rollout > COLLECTED:
@@ -136,6 +141,20 @@ class TrainingSettings:
                 f"lanes = {self.lanes} with rollout = {self.rollout}; allowed: a product of at most {COLLECTED}, the steps "
                 "between two updates"
             )
+
+    def _check_friction(self) -> None:
+        if not self.friction:
+            return
+        one_of("friction", self.friction, ("", *names("friction")))
+        if self.randomize not in (True, "plant"):
+            raise ValueError(
+                f"friction = {self.friction!r} with randomize = {self.randomize!r}; allowed: randomize = True or "
+                "'plant', which draw rigs"
+            )
+
+    def rig(self, parameters: Any = None) -> Parameters:
+        """The rig that ``parameters=`` describes, about which rigs are drawn."""
+        return with_friction(load_parameters(parameters), self.friction)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON takes it."""

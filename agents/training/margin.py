@@ -19,9 +19,9 @@ def widened(rig: Parameters, margin: float) -> Parameters:
     """``rig``, whose ranges end a ``margin`` further on where it oscillates: with 0.25 masses of 2 to 5 kg begin at 1.6 kg,
     and time constants of 1.2 to 8 ms end at 10 ms. What its ranges do not have is not drawn.
     """
-    ranges, known = {name: (low, high) for name, low, high in rig.ranges}, documented_ranges(rig)
+    ranges, known = rig.own_ranges, documented_ranges(rig)
     for name in (*CALMING, EXCITING):
         if name in known:
             low, high = known[name]
             ranges[name] = (low, high * (1.0 + margin)) if name == EXCITING else (low / (1.0 + margin), high)
-    return replace(rig, ranges=tuple((name, low, high) for name, (low, high) in ranges.items()))
+    return replace(rig, ranges=tuple((name, *bounds) for name, bounds in ranges.items()))

@@ -18,7 +18,6 @@ from agents.training.configuration import TrainingSettings, algorithm_of
 from agents.training.events import EVENTS, events_in
 from agents.training.margin import widened
 from agents.training.reached import Reached, described
-from birthsim_env.physics.rig.parameters import load_parameters
 
 
 def train(
@@ -39,7 +38,7 @@ def train(
             if (folder / name).exists():
                 raise ValueError(f"{str(folder)!r} has {name} but not its {CHECKPOINT}; allowed: another folder")
     torch.set_num_threads(1)
-    rig = load_parameters(parameters)
+    rig = settings.rig(parameters)
     arguments = {
         "sensors": settings.sensors, "randomize": settings.randomize, **residual.to_dict(),
         "autoreset_mode": AutoresetMode.SAME_STEP,

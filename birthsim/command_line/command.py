@@ -15,7 +15,7 @@ from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Dict
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
-from birthsim.command_line.settings import ALGORITHM, CONTROLLER, ENV, HAND, SENSORS, TABLE, Configured
+from birthsim.command_line.settings import ALGORITHM, CONTROLLER, ENV, FRICTION, HAND, SENSORS, TABLE, Configured
 from birthsim.command_line.start import endings
 
 S = TypeVar("S")
@@ -89,6 +89,7 @@ def _named(settings: type) -> str:
         (CONTROLLER, "policies, as residual:circle", lambda: names("policy")),
         (ENV, "environments", lambda: [environment_id(name) for name in names("scenario")]),
         (SENSORS, "sensors", lambda: names("sensors")),
+        (FRICTION, "frictions", lambda: names("friction")),
         (HAND, "hands", lambda: names("hand")),
         (TABLE, "endings of tables", lambda: names("reader")),
     ]

@@ -83,6 +83,10 @@ Seed = Annotated[int, whole(0, 2**32 - 1)]
 SENSORS = Parameter(group=WORLD, metavar="NAME", validator=named("sensors"))
 ALGORITHM = Parameter(metavar="NAME", validator=named("algorithm"))
 Sensors = Annotated[str, SENSORS, Parameter(help="Sensor model, one of those below.")]
+FRICTION = Parameter(group=WORLD, metavar="NAME", validator=named("friction"))
+Friction = Annotated[
+    str, FRICTION, Parameter(help="What the friction of rigs is drawn from, one of those below, else the rig's.")
+]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
 RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
 MANY = Parameter(consume_multiple=True)

@@ -6,9 +6,20 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from birthsim.command_line.settings import ALGORITHM, PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
+from birthsim.command_line.settings import (
+    ALGORITHM,
+    PROCESSES,
+    RANDOMIZE,
+    Env,
+    Friction,
+    Randomize,
+    RigFile,
+    Seed,
+    Sensors,
+    whole,
+)
 
-CHANGES = ("algorithm", "steps", "sensors", "until", "law", "impedance", "authority")
+CHANGES = ("algorithm", "steps", "sensors", "friction", "until", "law", "impedance", "authority")
 """Options that are called as the settings of a training that they change."""
 
 
@@ -47,6 +58,7 @@ class Settings:
     sensors: Sensors | None = None
     randomize: Randomize | None = None
     """What training varies."""
+    friction: Friction | None = None
     parameters: RigFile = None
 
 

@@ -6,7 +6,9 @@ linear one. That holds for names of the registry and for ``path/to/file.py:Class
 
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
 the documented ranges. The worlds are those of ``Circle-v2``, rig and scenario drawn, and of the stiffness test of
-``baselines.bench.probes``, with each sensor model. The loss of a lane is in mm: on the circle the settled error, in the
+``baselines.bench.probes``, with each sensor model. With ``--friction drawn`` every rig has one of several friction laws, which
+the controller does not know (``birthsim_env.parts.drawn.frictions``). That is an option and no default, so that the commands
+that pages name still find the gains that are stored. The loss of a lane is in mm: on the circle the settled error, in the
 stiffness test the error of the displacement at full force plus the hunting. A lost lane costs ``WORST``, and no lane more. The
 cost is the sum over scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the
 gains of a file. The next trials are drawn at random; Optuna's TPE sampler proposes the rest.
@@ -32,10 +34,11 @@ from baselines.controller import Controller
 from baselines.named import make_controller, split_options
 from baselines.tables import aligned
 from baselines.work.tasks import Task, result_of
-from birthsim.command_line.settings import CONTROLLER, SENSORS, Parts, RigFile, Seed, Set, named, whole
+from birthsim.command_line.settings import CONTROLLER, SENSORS, Friction, Parts, RigFile, Seed, Set, named, whole
 from birthsim.command_line.worlds import check_world, with_options
 from birthsim_env.extras import installation
 from birthsim_env.files import own_folder, whole_results, write_json
+from birthsim_env.parts.drawn.frictions import with_friction
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import Array
@@ -187,6 +190,7 @@ class Settings(Parts):
     """A gains.json, for trial 0, else the middle of every range."""
     lanes: Annotated[int, whole(1, LANES)] = 32
     """Rigs of each scenario."""
+    friction: Friction | None = None
     parameters: RigFile = None
     out: Path
     """Folder for trials, trials.json and gains.json."""
@@ -194,7 +198,7 @@ class Settings(Parts):
 
 def main(settings: Settings) -> None:
     """Run the trials that the folder lacks, and print the best."""
-    rig = load_parameters(settings.parameters)
+    rig = with_friction(load_parameters(settings.parameters), settings.friction or "")
     sensors = TUNED_FOR if settings.sensors == "both" else (settings.sensors,)
     controller, own = with_options([settings.controller], settings.set)[0], settings.parts()
     bounds = {name: pair for name, pair in bounds_of(controller, rig).items() if name not in split_options(controller)[1]}

@@ -12,6 +12,7 @@ from birthsim_env.gradients.graph import Graph
 from birthsim_env.gradients.source import Output, loop, module_of
 from birthsim_env.gradients.symbols import Unknown
 from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.drawn.frictions import LAW, OPTIONAL
 from birthsim_env.parts.drawn.randomization import draw_rig
 from birthsim_env.parts.drawn.seeding import STREAMS, is_vectorised
 from birthsim_env.physics.compiled.lanes import Array
@@ -79,8 +80,11 @@ def rows_in(graph: Graph) -> int:
 def drawing(simulation: Simulation) -> Stage:
     """A stage that draws the world of an episode whose seed and number are in the simulation's ``Start``, its memory.
 
-    It writes rigs and tables, to the bits of ``Simulation.begin``. Raises ``ValueError`` for a part that draws in Python.
+    It writes rigs and tables, to the bits of ``Simulation.begin``. Raises ``ValueError`` for a part that draws in Python, and
+    for a friction law with states that the rig as described has not: a device is built for one kind of plant.
     """
+    if OPTIONAL in simulation.ranges.get(LAW, ()) and simulation.parameters.friction.law != OPTIONAL:
+        raise ValueError(f"{LAW} drawn from {', '.join(simulation.ranges[LAW])}; allowed on a device: all but {OPTIONAL}")
     graph, outputs, tables, body = Graph(), list[Output](), list[Array](), list[str]()
     parts = {
         "reference": simulation.trajectory, "user_force": simulation.user_force, "stiffness": simulation.stiffness,

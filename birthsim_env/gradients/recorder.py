@@ -101,6 +101,7 @@ class Recorder:
         simulation = self._simulation
         if self._made is simulation.made:
             return
+        require_plain(simulation.plant)  # of which an episode may have drawn an option
         pipeline, places = simulation.pipeline, simulation.places()
         named, closing = list[tuple[str, Stage]](), list[Stage]()
         for step in pipeline:

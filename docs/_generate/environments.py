@@ -72,6 +72,16 @@ def _shared() -> str:
             "|---|---|---|",
             *map(_hand_row, entries("hand")),
             "",
+            "### Frictions",
+            "",
+            "`friction = NAME` under `[randomize]` in the file of a rig draws the friction of its plants, wherever rigs are "
+            "drawn. Controllers go on believing the friction that the file describes. What an entry does not name is as the "
+            "file says, or drawn as [the rig](rig.md) documents it.",
+            "",
+            "| `friction` | what plants have | laws | ranges, SI | source |",
+            "|---|---|---|---|---|",
+            *map(_friction_row, entries("friction")),
+            "",
             "### Reward",
             "",
             terms,
@@ -101,6 +111,12 @@ def _sensor_row(model: Entry) -> str:
 
 def _hand_row(hand: Entry) -> str:
     return f"| `{hand.name}` | {hand.about} | {_yes(hand.made.closed_loop)} |"
+
+
+def _friction_row(friction: Entry) -> str:
+    laws = ", ".join(f"`{law}`" for law in friction.made.laws)
+    ranges = "; ".join(f"`{name}` {low:g} to {high:g}" for name, (low, high) in friction.made.ranges.items())
+    return f"| `{friction.name}` | {friction.about} | {laws} | {ranges} | {friction.made.source} |"
 
 
 def _yes(said: object) -> str:

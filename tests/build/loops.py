@@ -31,6 +31,7 @@ BEGUN = {
     "options": ("circle", {"parameters": OPTIONS, "sensors": "lab"}),
     "options, honest, no force sensor": ("forceps", {"parameters": OPTIONS, "sensors": "honest", "force_sensor": False}),
     "sensors": ("probe", {"randomize": "sensors", "sensors": "honest"}),
+    "frictions": ("probe", {"parameters": {"randomize": {"friction": "drawn-smooth"}}}),
     "nothing drawn": ("descent", {"randomize": False}),
     "two fields": ("vacuum", {"randomize": {"mechanics.mass": (2.0, 3.0), "cylinder1.piston_diameter": (0.031, 0.032)}}),
     "contractions": ("probe", {"user_force": Contractions((-9.0, 9.0), 3, 1.3, (0, 9), (0.1, 0.9), 2.1)}),

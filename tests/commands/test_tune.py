@@ -128,6 +128,28 @@ def test_probes_are_pushed_rigs_of_the_documented_ranges():
     assert again.rigs == probes.rigs[:20]
 
 
+def test_frictions_are_drawn_which_the_controller_does_not_know(own, tmp_path, monkeypatch, capsys):
+    asked = []
+
+    def watched(controller, rig, sensors, lanes):
+        asked.append((controller, rig, sensors))
+        return {"cost": 1.0}
+
+    monkeypatch.setattr(tune, "costs", watched)
+    run = ("--controller", own, "--trials", 1, "--out", tmp_path / "out", "--sensors", "honest", "--friction")
+    status, printed, _ = call("tune", monkeypatch, capsys, *run, "drawn")
+    assert status == 0
+    assert "law of friction lugre or elasto_plastic or coulomb or gms" in printed
+    ((_, rig, sensors),) = asked
+    assert sensors == ("honest",)
+    assert rig.friction == Parameters().friction, "what the controller is told"
+    assert {one.friction.law for one in tune.probes(rig, 40).rigs} == {"lugre", "elasto_plastic", "coulomb", "gms"}
+    assert {one.friction.law for one in tune.probes(Parameters(), 40).rigs} == {"lugre"}
+    status, _, said = call("tune", monkeypatch, capsys, *run, "drwan")
+    assert status != 0
+    assert "did you mean 'drawn'?" in said
+
+
 @pytest.mark.slow
 def test_costs_on_the_plant_tell_good_gains_from_bad_ones(own):
     """The same gains cost the same; a slack PID costs more, valves that stay shut much more."""

@@ -124,3 +124,17 @@ def test_ranges_reach_further_on_one_side_and_an_owners_own_count() -> None:
     ranges = documented_ranges(widened(rig, 0.25))
     assert ranges["mechanics.mass"] == (7.0 / 1.25, 10.0)
     assert ranges["air.supply_pressure"] == (6e5, 7e5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"friction": "sticky"}, "friction = 'sticky'; allowed: '', 'lugre'"),
+        ({"friction": "drawn", "randomize": "scenario"}, "with randomize = 'scenario'; allowed: randomize = True or 'plant'"),
+        ({"friction": "gms", "algorithm": "apg"}, "friction = 'gms' with algorithm = 'apg', though gms has no gradients"),
+        ({"friction": "drawn", "algorithm": "apg"}, r"allowed: 'lugre', .*'drawn-smooth'"),
+    ],
+)
+def test_frictions_that_no_training_can_draw_are_refused(changes, words):
+    with pytest.raises(ValueError, match=words):
+        TrainingSettings(**changes)

@@ -17,7 +17,7 @@ from agents.residual.settings import ResidualSettings
 from agents.training import reached as reached_module
 from agents.training import trainer as training
 from agents.training import validation
-from agents.training.configuration import TrainingSettings
+from agents.training.configuration import TrainingSettings, load_configuration
 from agents.training.margin import widened
 from agents.training.sb3 import monitor
 from agents.training.trainer import train
@@ -25,6 +25,8 @@ from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.simulation import Simulation
 from tests.training.brief import steady
 
 PROBE = "BirthSIM/ProbeResidual-v3"
@@ -263,3 +265,29 @@ def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
         ValueError, match=rf"maps {policy.network.inputs} to 2 numbers; allowed: {policy.network.inputs - TRUE_PARAMETERS}"
     ):
         ResidualController(policy=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "friction", "laws"),
+    [("ppo", "drawn", 4), pytest.param("apg", "drawn-smooth", 3, marks=pytest.mark.slow)],
+)
+def test_a_line_of_a_configuration_draws_frictions_in_training_and_validation(tmp_path, monkeypatch, algorithm, friction, laws):
+    """The plants' laws, when lanes have begun, while their controllers go on believing LuGre."""
+    (tmp_path / "own.toml").write_text(f'[training]\nfriction = "{friction}"\n')
+    settings = replace(load_configuration(tmp_path / "own.toml")[0], algorithm=algorithm, steps=256, lanes=64, rollout=2)
+    settings = replace(settings, batch=64, epochs=1, hidden=(8,), validation_lanes=32, validations=1)
+    begin, seen = Simulation.begin, {}
+
+    def watched(simulation, *given):
+        begin(simulation, *given)
+        p = simulation.plant.lane_parameters
+        seen[simulation.plant.num_envs] = {tuple(lane) for lane in p[[at.LUGRE, at.GMS, at.BRISTLED]].T}, simulation.parameters
+
+    monkeypatch.setattr(Simulation, "begin", watched)
+    reached = train(settings, ResidualSettings(), tmp_path / "out")
+    assert seen.keys() == {64, 32}
+    for drawn, believed in seen.values():
+        assert len(drawn) == laws
+        assert ((0.0, 1.0, 1.0) in drawn) == (friction == "drawn"), "generalised Maxwell slip"
+        assert believed.friction.law == "lugre"
+    assert reached["settings"]["friction"] == friction

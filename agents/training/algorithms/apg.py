@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents.training.algorithm import Algorithm, Learner
-from birthsim_env.registry import register
+from birthsim_env.parts.drawn.frictions import OPTIONAL
+from birthsim_env.registry import entries, register
 
 if TYPE_CHECKING:
     from agents.training.configuration import TrainingSettings
@@ -18,6 +19,13 @@ class AnalyticPolicyGradient(Algorithm):
     """``agents.training.policy_gradient``: ``rollout`` is its horizon."""
 
     takes, collects = frozenset({"target", "beside", "noise"}), True
+
+    def complaint(self, settings: TrainingSettings) -> str:
+        laws = {one.name: one.made.laws for one in entries("friction")}
+        if OPTIONAL not in laws.get(settings.friction, ()):
+            return ""
+        others = ", ".join(repr(name) for name in laws if OPTIONAL not in laws[name])
+        return f"friction = {settings.friction!r} with algorithm = 'apg', though {OPTIONAL} has no gradients; allowed: {others}"
 
     def learner(self, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> Learner:
         from agents.training.policy_gradient import PolicyGradient

@@ -1,26 +1,30 @@
 """Domain randomisation of the rig: uniform draws from the ranges that parameters are declared with.
 
-Of a parameter that is known by its order of magnitude alone the logarithm is uniform.
+Of a parameter that is known by its order of magnitude alone the logarithm is uniform; of a choice all words that are given are
+alike.
 """
 
 import copy
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from birthsim_env.parts.drawn.frictions import with_ranges
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.sensors.model import drawn_by
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array, parameter_columns
 from birthsim_env.physics.rig.arrays import shape_of
 from birthsim_env.physics.rig.consistency import least_dead_volume
-from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS, Parameters, parameter_of
+from birthsim_env.physics.rig.parameters import DECLARED, FRICTION, SECTIONS, Parameters, parameter_of
 from birthsim_env.physics.rig.values import is_finite, shown
 from birthsim_env.registry import entries
 
-Ranges = Mapping[str, tuple[float, float]]
+Ranges = Mapping[str, tuple[Any, ...]]
+"""Dotted name -> (low, high), or words of a choice."""
 
 RANDOMIZE = (False, True, "plant", "scenario", "sensors")
 """Words of the environments' argument ``randomize``. With ``"sensors"`` the rig is the one described, and what a law believes
@@ -43,13 +47,14 @@ def _drawn_by_some() -> set[str]:
     return {name for model in entries("sensors") for name in model.made.drawn}
 
 
-def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
-    """Dotted field name -> (low, high), SI units: what domain randomisation of a rig with a sensor model draws from.
+def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[Any, ...]]:
+    """Dotted field name -> (low, high), SI units, or words: what domain randomisation of a rig with a sensor model draws from.
 
     A parameter of the default rig is assumed, and has the range that it is declared with; one that the owner
-    has given another value is known to ``KNOWN``. Where the rig has ``ranges`` of its own, those count.
+    has given another value is known to ``KNOWN``. Where the rig has ``ranges`` of its own, those count: more than what a
+    friction of the sweep that it names says too.
     """
-    ranges = {}
+    ranges: dict[str, tuple[Any, ...]] = {}
     for dotted, one in DECLARED.items():
         if one.range and not one.on_request:
             section, _, name = dotted.partition(".")
@@ -59,12 +64,15 @@ def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, 
             ranges[dotted] = (low, high)
     volume = "chambers.dead_volume"
     ranges[volume] = (max(ranges[volume][0], least_dead_volume(nominal)), ranges[volume][1])
-    ranges.update({name: (low, high) for name, low, high in nominal.ranges})
+    own = nominal.own_ranges
+    if FRICTION in own:
+        ranges = with_ranges(own.pop(FRICTION)[0], nominal, ranges)
+    ranges.update(own)
     left_out = _drawn_by_some() - set(drawn_by(sensors))
     return {name: pair for name, pair in ranges.items() if name not in left_out}
 
 
-def ranges_of(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
+def ranges_of(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> dict[str, tuple[Any, ...]]:
     """The ``documented_ranges`` that a word of the environments' argument ``randomize`` draws from, one of ``RANDOMIZE``."""
     if randomize in (False, "scenario"):
         return {}
@@ -77,32 +85,38 @@ def described(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> st
     if not isinstance(randomize, Mapping):
         randomize = ranges_of(nominal, randomize, sensors)
     named = []
-    for name, (low, high) in randomize.items():
+    for name, bounds in randomize.items():
         section, _, own = name.partition(".")
-        words = f"{own} of {section}" if section.startswith("cylinder") else own
+        words = f"{own} of {section}" if section.startswith("cylinder") or parameter_of(name).choices else own
         unit = parameter_of(name).unit.removeprefix("-")
-        named.append(f"{words.replace('_', ' ')} {low:.4g} to {high:.4g} {unit}".rstrip())
+        of = " or ".join(bounds) if parameter_of(name).choices else "{:.4g} to {:.4g}".format(*bounds)
+        named.append(f"{words.replace('_', ' ')} {of} {unit}".rstrip())
     drawn = "rigs" if set(randomize) - set(drawn_by(sensors)) else "sensors"
     return f"{drawn} drawn: {', '.join(named)}" if named else "the rig as described"
 
 
-def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
-    """``ranges`` if each names a numeric field that lanes may differ in, with a finite (low, high) possible for ``nominal``
+def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[Any, ...]]:
+    """``ranges`` if each names a field that lanes may differ in, with a finite (low, high), or words, possible for ``nominal``
     under a sensor model.
 
     Else ``ValueError`` naming the entry.
     """
-    checked = {}
+    checked: dict[str, tuple[Any, ...]] = {}
     for name, bounds in ranges.items():
         if not isinstance(name, str):
             raise ValueError(f"randomize[{shown(name)}]; allowed: dotted names of parameters such as 'mechanics.mass'")
-        if parameter_of(name).choices:
-            raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
         if name not in drawn_by(sensors) and (name.partition(".")[0] in SHARED or name in SHARED):
             more = f"; with other sensors {name}" if name in _drawn_by_some() else ""
             raise ValueError(
                 f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes{more}"
             )
+        if choices := parameter_of(name).choices:
+            words = tuple(bounds) if isinstance(bounds, (tuple, list)) else ()
+            if not words or any(word not in choices for word in words) or len({*words}) < len(words):
+                some = ", ".join(map(repr, choices))
+                raise ValueError(f"randomize[{shown(name)}] = {shown(bounds)}; allowed: one or more of {some}, each once")
+            checked[name] = words
+            continue
         pair = tuple(bounds) if isinstance(bounds, (tuple, list, np.ndarray)) and shape_of(bounds) == (2,) else (math.nan,) * 2
         if not (is_finite(pair[0]) and is_finite(pair[1]) and pair[0] <= pair[1]):
             raise ValueError(f"randomize[{shown(name)}] = {shown(bounds)}; allowed: (low, high), finite and ordered")
@@ -110,12 +124,14 @@ def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") 
         checked[name] = (low, high)
         nominal.replace({name: low})
         nominal.replace({name: high})
-    # Whatever is checked of several fields together grows or falls with each: two rigs are the worst of all that can be drawn.
-    for thinnest in (False, True):
-        at_least = {name for name in checked if DECLARED[name].hardest_low or (thinnest and name in BORES)}
-        worst = {name: low if name in at_least else high for name, (low, high) in checked.items()}
+    # Whatever is checked of several fields together grows or falls with each: of the rigs of the same words two are the worst.
+    chosen = {name: words for name, words in checked.items() if DECLARED[name].choices}
+    numbers = {name: pair for name, pair in checked.items() if name not in chosen}
+    for thinnest, *said in itertools.product((False, True), *chosen.values()):
+        at_least = {name for name in numbers if DECLARED[name].hardest_low or (thinnest and name in BORES)}
+        worst = {name: low if name in at_least else high for name, (low, high) in numbers.items()}
         try:
-            nominal.replace(worst)
+            nominal.replace({**worst, **dict(zip(chosen, said, strict=True))})
         except ValueError as error:
             raise ValueError(f"randomize: some of the rigs drawn are impossible: {error}") from None
     return checked
@@ -149,11 +165,33 @@ def draw_rig(nominal: Parameters, ranges: Ranges, streams: Streams) -> Parameter
 
 
 def draw_figures(ranges: Ranges, rng: Any) -> dict[str, Any]:
-    """What is drawn of each range, sorted by name: a number each from a generator, or (L,) from ``Streams`` of L lanes."""
-    return {name: _one_drawn(name, *ranges[name], rng) for name in sorted(ranges)}
+    """What is drawn of each range, sorted by name: a number or word from a generator, or (L,) from ``Streams`` of L lanes."""
+    return {name: _one_drawn(name, ranges[name], rng) for name in sorted(ranges)}
 
 
-def _one_drawn(name: str, low: float, high: float, rng: Any) -> Any:
+class Words:
+    """A word of each of L lanes, which knows where it is one word or another: ``words == "gms"`` is 1.0 there, else 0.0.
+
+    ``place`` (L,) is where a lane's word stands among ``words``, and a fraction more.
+    """
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, words: tuple[str, ...], place: Any) -> None:
+        self._words, self._place = words, place
+
+    def __eq__(self, word: object) -> Any:
+        if word not in self._words:
+            return 0.0
+        k = self._words.index(str(word))
+        return np.where(self._place < k + 1, 1.0, 0.0) * np.where(self._place < k, 0.0, 1.0)
+
+
+def _one_drawn(name: str, bounds: tuple[Any, ...], rng: Any) -> Any:
+    if parameter_of(name).choices:
+        place = len(bounds) * rng.uniform()
+        return bounds[int(place)] if isinstance(place, float) else Words(bounds, place)
+    low, high = bounds
     if not parameter_of(name).logarithmic:
         return rng.uniform(low, high)
     share = rng.uniform()

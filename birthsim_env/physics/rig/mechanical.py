@@ -276,8 +276,8 @@ class Friction(Section):
         hardest_low=True,
     )
 
-    lugre = derived("1", "1 with the friction law of that name, else 0", lambda own: float(own.law == "lugre"))
-    gms = derived("1", "1 with the friction law of that name, else 0", lambda own: float(own.law == "gms"))
-    bristled = derived("1", "1 with a friction law that has bristles, else 0", lambda own: float(own.law != "coulomb"))
+    lugre = derived("1", "1 with the friction law of that name, else 0", lambda own: 1.0 * (own.law == "lugre"))
+    gms = derived("1", "1 with the friction law of that name, else 0", lambda own: 1.0 * (own.law == "gms"))
+    bristled = derived("1", "1 with a friction law that has bristles, else 0", lambda own: 1.0 - (own.law == "coulomb"))
     steepness = derived("1", "1/(1 - breakaway)", lambda own: 1 / (1 - own.breakaway_ratio))
     sign_slope = derived("s/m", "1/sign_speed", lambda own: 1 / own.sign_speed)

@@ -49,9 +49,10 @@ class Parameters:
         Supply and atmosphere (Pa), temperature (K), and the gas itself.
     electronics : Electronics
         Control period (s), sensors and their errors.
-    ranges : tuple of (str, float, float)
-        The owner's own ranges for domain randomisation, (dotted name, low, high): the table ``[randomize]`` of a file,
-        ``"mechanics.mass" = [7.2, 10.8]``.
+    ranges : tuple of (str, float, float) or (str, str, ...)
+        The owner's own ranges for domain randomisation, (dotted name, low, high), or (dotted name, word, ...) of a choice: the
+        table ``[randomize]`` of a file, ``"mechanics.mass" = [7.2, 10.8]``. ``("friction", name)``, there ``friction = name``,
+        is a friction of ``parts.drawn.frictions``.
 
     Raises
     ------
@@ -86,7 +87,7 @@ class Parameters:
     valve_n2: Valve = Valve()
     air: Air = Air()
     electronics: Electronics = Electronics()
-    ranges: tuple[tuple[str, float, float], ...] = ()
+    ranges: tuple[tuple[Any, ...], ...] = ()
 
     vars().update(edge_rows())
 
@@ -95,6 +96,11 @@ class Parameters:
             if not isinstance(getattr(self, name), type(part)):
                 raise ValueError(f"{name} = {shown(getattr(self, name))}; allowed: an instance of {type(part).__name__}")
         check_together(self)
+
+    @property
+    def own_ranges(self) -> dict[str, tuple[Any, ...]]:
+        """``ranges`` by name."""
+        return {name: tuple(bounds) for name, *bounds in self.ranges}
 
     def replace(self, changes: dict[str, Any]) -> Self:
         """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``.
@@ -119,7 +125,8 @@ class Parameters:
         Without ``options`` these (``declaration.Parameter``) are named only where they differ from their defaults.
         """
         sections = {name: getattr(self, name).to_dict(options) for name in SECTIONS}
-        return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
+        table = {name: bounds[0] if name == FRICTION else list(bounds) for name, bounds in self.own_ranges.items()}
+        return {**sections, **({RANDOMIZE: table} if table else {})}
 
     @classmethod
     def from_dict(cls, sections: dict[str, Any]) -> Self:
@@ -159,20 +166,28 @@ def _word(key: Any) -> str:
     return in_line(key) if isinstance(key, str) else shown(key)
 
 
-def _own_ranges(table: Mapping[Any, Any]) -> tuple[tuple[str, float, float], ...]:
+def _own_ranges(table: Mapping[Any, Any]) -> tuple[tuple[Any, ...], ...]:
     """The table ``[randomize]`` of a file; names and limits are checked where they are drawn from."""
-    found = []
+    found: list[tuple[Any, ...]] = []
     for name, bounds in table.items():
-        parameter_of(name)
-        if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
-            words = f"[{RANDOMIZE}] {name} = {shown(bounds)}"
-            raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
-        found.append((name, float(bounds[0]), float(bounds[1])))
+        words = f"[{RANDOMIZE}] {_word(name)} = {shown(bounds)}"
+        if name == FRICTION:
+            if not isinstance(bounds, str):
+                raise ValueError(f"{words}; allowed: the name of a friction, such as 'drawn'")
+            found.append((name, bounds))
+        elif parameter_of(name).choices:
+            if not (isinstance(bounds, list) and bounds and all(isinstance(one, str) for one in bounds)):
+                raise ValueError(f'{words}; allowed: "section.field" = [word, ...], some of its choices')
+            found.append((name, *bounds))
+        else:
+            if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
+                raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
+            found.append((name, float(bounds[0]), float(bounds[1])))
     return tuple(sorted(found))
 
 
-RANDOMIZE = "randomize"
-"""The table of a file that holds an owner's own ranges."""
+RANDOMIZE, FRICTION = "randomize", "friction"
+"""The table of a file that holds an owner's own ranges, and the key there that names a friction of the sweep."""
 
 SECTIONS: dict[str, Section] = {one.name: one.default for one in dataclasses.fields(Parameters) if one.name != "ranges"}  # type: ignore[misc]
 """Name of a section -> what it is in ``Parameters()``."""

@@ -125,7 +125,7 @@ def _spring(force: Array, stiffness: Array) -> Array:
 def static_only(rig: Parameters) -> Parameters:
     """``rig`` whose sensors have no errors but ``STATIC``, which are drawn as those of ``rig``."""
     others = {f"electronics.{name}": 0.0 for name in SENSOR_PARAMETERS if name not in STATIC}
-    ranges = {name: (low, high) for name, low, high in rig.ranges} | {name: (0.0, 0.0) for name in others}
+    ranges = rig.own_ranges | {name: (0.0, 0.0) for name in others}
     return replace(rig.replace(others), ranges=tuple((name, *pair) for name, pair in ranges.items()))
 
 

@@ -19,7 +19,7 @@ def believed(rig: Parameters, plant: str) -> Parameters:
     if plant == "randomised":
         return described
     exact = {name: around(described, name, 0.0) for name in documented_ranges(described)}
-    return _with(described, {**{name: (low, high) for name, low, high in described.ranges}, **exact})
+    return _with(described, {**described.own_ranges, **exact})
 
 
 def around(rig: Parameters, name: str, off: float) -> tuple[float, float]:

@@ -1,0 +1,1 @@
+"""Controllers on frictions that they do not expect."""
