@@ -194,7 +194,7 @@ TABLE = {
     ("3", ""): [env(randomize={3: (2, 5)})],
     ("Mechanics.mass = 0.0", "> 0"): [env(randomize={"mechanics.mass": (0.0, 3.0)})],
     ("critical_ratio = 0.95", "0.9"): [env(randomize={"valves.critical_ratio": (0.2, 0.95)})],
-    ("friction.law", "numeric"): [env(randomize={"friction.law": ("coulomb", "lugre")})],
+    ("friction.law", "'lugre', 'coulomb'"): [env(randomize={"friction.law": of}) for of in (("coulomb", "ice"), ())],
     **{
         # Drawing what all lanes share would change nothing, or put the end effector beside its target.
         (f"randomize['{name}']", ""): [env(randomize={name: (0.1, 0.4)})]
