@@ -27,7 +27,7 @@ from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.simulation import Simulation
-from tests.training.brief import steady
+from tests.training.brief import TINY, steady
 
 PROBE = "BirthSIM/ProbeResidual-v3"
 RESIDUAL = ResidualSettings()
@@ -132,18 +132,7 @@ def test_events_are_there_for_tensorboard_each_at_its_own_step(trained):
 )
 def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
-    settings = replace(
-        BRIEF,
-        algorithm=algorithm,
-        memory=4 * (algorithm == "recurrent-ppo"),
-        steps=512,
-        lanes=8,
-        batch=64,
-        epochs=1,
-        gradient_steps=1,
-        hidden=(8, 8),
-        validation_lanes=2,
-    )
+    settings = replace(TINY, algorithm=algorithm, memory=4 * (algorithm == "recurrent-ppo"), steps=512)
     for name, seed in (("one", 0), ("again", 0), ("other", 1)):
         reached = train(replace(settings, seed=seed), RESIDUAL, tmp_path / name)
         results.append((reached["curve"], (tmp_path / name / WEIGHTS).read_bytes()))
