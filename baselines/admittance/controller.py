@@ -192,6 +192,7 @@ class AdmittanceController(StagedController):
             friction_rate=g["friction_rate"] if learns_force else 0.0,
             identified=self._identified,
             learns_mass=sampled and learns_force,
+            feels_stiff_hand=learns_force,
             weighed=weighed,
             believed_limit=estimator.BELIEVED_LIMIT if inert or fixed else estimator.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,

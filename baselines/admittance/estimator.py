@@ -1,6 +1,7 @@
 """The estimator of the admittance controller: one call a control period, in the order of its functions.
 
 - read_sensors: the hand's force and the noise of the tracker, as measured and believed or as learned;
+- answer_stiff_hand: how much heavier and more damped the motion is while a stiff hand makes the head swing;
 - admittance.update_motion: the motion that the hand should find;
 - predict: spools, pressures and the friction along that motion;
 - correct: positions and speeds of the pistons, and what accelerates them without being known;
@@ -21,6 +22,7 @@ from baselines.estimation import (
     observers,
     reference_friction,
     stages,
+    stiff_hand,
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
@@ -38,6 +40,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 BELIEVED_LIMIT, BELIEVED_HAND = 120.0, 400.0
 """N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below the first.
 Below the second are 7 kg on a small bore and, unseen without a force sensor, the strongest hand."""
+
+HEAVIER, MORE_DAMPED = 10.0, 2.0
+"""1: what multiplies mass and damping ratio of the motion that a stiff hand finds while it is answered; found by trial. The
+damping in N s/m grows by the root of the first besides."""
 
 
 @helper
@@ -59,6 +65,18 @@ def read_sensors(seen: Seen, memory: Memory, estimate: Estimate, constants: Esti
     for i in range(lanes):
         for k in range(2):
             estimate.inputs.force[k, i] = hand[k, i] if constants.force_sensor + constants.weighed > 0.0 else 0.0
+
+
+@helper
+def answer_stiff_hand(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+    """What multiplies mass and damping of the motion that the hand should find."""
+    if constants.feels_stiff_hand > 0.0:
+        noise, period = estimate.inputs.noise, constants.model.period
+        stiff_hand.observe(memory.stiff_hand, seen, estimate.hand, noise, period, memory.fresh)
+    for i in range(memory.fresh.shape[0]):
+        felt, factor = memory.stiff_hand.felt[i], seen.damping_factor[i]
+        estimate.heavier[i] = 1.0 + (HEAVIER - 1.0) * felt
+        estimate.damping_factor[i] = max(1.0, factor) * (1.0 + (MORE_DAMPED - 1.0) * felt)
 
 
 @helper
@@ -135,8 +153,15 @@ def estimate(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimato
     Returns how many stiffness setpoints are not positive definite.
     """
     read_sensors(seen, memory, estimate, constants)
+    answer_stiff_hand(seen, memory, estimate, constants)
     missed = admittance.update_motion(
-        memory.offset, seen.asked, estimate.hand, constants.compliance, seen.damping_factor, estimate.motion
+        memory.offset,
+        seen.asked,
+        estimate.hand,
+        constants.compliance,
+        estimate.damping_factor,
+        estimate.heavier,
+        estimate.motion,
     )
     admittance.mark_moving(estimate.motion, estimate.inputs.moving)
     predict(seen, memory, estimate, constants)
@@ -178,6 +203,7 @@ def estimator_parameters(
         "weighed": False,
         "identified": False,
         "learns_mass": False,
+        "feels_stiff_hand": False,
         "believed_limit": BELIEVED_LIMIT,
         **others,
     }

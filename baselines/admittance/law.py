@@ -10,6 +10,7 @@ with the forces unseen of ``estimator``: believed friction and what an observer 
   noise a slow average leaves must not wear the friction down.
 - ``gain_fraction`` lowers c across or along cylinder 2 where the loop oscillates in that direction: the rig is then slower,
   lighter or held more stiffly than believed.
+- ``HELD_GAIN`` is what is left of c while a stiff hand is answered (``estimation.stiff_hand``).
 - ``rest_gain_fraction`` lowers c for a while where the loop swings at rest, if nothing but friction tells the law of the hand.
 - Position errors count up to ``MOST_ERROR``, so that the loop comes back calmly from a load that was beyond its strength.
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
@@ -38,6 +39,10 @@ it is back. Found by trial: without a force sensor a stiff hand makes a resting 
 
 NOWHERE, DRIFTING = 8e-3, 3.0
 """m/s and 1/s: a motion goes nowhere while its velocity, low-passed, is below; found by trial."""
+
+HELD_GAIN = 20.0
+"""1/s: c while a stiff hand is answered; found by trial. With 15 a hand is pressed by 1.7 times the force (95 %) after 5 s, as
+errors of the weight are closed more slowly; with 25 and more, soft bristles swing on."""
 
 MOST_ERROR = 0.006
 """m; assumed: no position error counts for more. A larger one, left by a load beyond what the cylinders can hold, is closed at
@@ -136,6 +141,7 @@ def command(seen: Seen, memory: Memory, estimate: Estimate, gains: Gains, assume
         fraction_n = gain_fraction(follower.along, i, dn, period, gains)
         follower.moved[i] = max(estimate.inputs.moving[i], follower.moved[i] * exact.exp(-period / MOTION_TIME))
         c = gains.rest_gain + (gains.gain - gains.rest_gain) * follower.moved[i]
+        c -= memory.stiff_hand.felt[i] * max(0.0, c - HELD_GAIN)
         if gains.swing > 0.0:
             gone = motion_fraction(follower, i, motion, period)
             fraction_t *= gone + (1.0 - gone) * rest_gain_fraction(follower.rest_across, i, dt, period, gains)

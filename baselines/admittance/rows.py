@@ -9,6 +9,7 @@ from baselines.estimation.hand.half_wave import HalfWave
 from baselines.estimation.hand.held_force import RestDetector
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import AssumedParameters, Inputs, Pistons
+from baselines.estimation.stiff_hand import StiffHand
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
@@ -46,6 +47,7 @@ class Memory(Rows):
     hand = part(Hand, "force of the hand without a sensor")
     contact = part(ContactForce, "the same where friction is known")
     rest_detector = part(RestDetector, "whether the head rests, without a force sensor")
+    stiff_hand = part(StiffHand, "whether a stiff hand makes the head swing")
     follower = part(Follower, "loop")
     pistons = part(Pistons, "observer")
 
@@ -59,6 +61,8 @@ class Estimate(Rows):
     drag = rows("drag1 drag2", "N", "friction along the motion, as believed of the rig")
     unexplained = rows("R1 R2", "N", "what pressures, weight, motion and measured force leave unexplained along the pistons")
     hand = rows("Fx Fy", "N", "force of the hand, measured or found")
+    heavier = row("1", "what multiplies the mass that the hand should find")
+    damping_factor = row("1", "what multiplies its damping")
 
 
 class EstimatorParameters(Numbers):
@@ -78,6 +82,7 @@ class EstimatorParameters(Numbers):
     friction_fraction = number("1", "fraction of the believed friction that is fed forward")
     learns_mass = number("1", "1 where the mass is learned")
     friction_rate = number("1/s", "rate at which the level of friction is learned; 0 learns nothing")
+    feels_stiff_hand = number("1", "1 where a stiff hand that makes the head swing is answered")
     most_bias = number("N", "largest bias of the force sensor that is taken off; 0 takes nothing")
 
 

@@ -93,16 +93,20 @@ def advance(offset: Point, i: int, period: float, rates: tuple[float, float, flo
 
 
 @helper
-def update_motion(offset: Point, asked: Reference, force: Array, constants: Compliance, factor: Array, motion: Motion) -> int:
+def update_motion(
+    offset: Point, asked: Reference, force: Array, constants: Compliance, factor: Array, heavier: Array, motion: Motion
+) -> int:
     """Writes ``motion`` and carries ``offset`` on by one period; returns how many setpoints are not positive definite.
 
-    ``force`` (2, N), N, is the hand's; ``factor`` (N,) multiplies the damping where it is more than 1.
+    ``force`` (2, N), N, is the hand's; ``factor`` (N,) multiplies the damping where it is more than 1, and ``heavier`` (N,)
+    the mass.
     """
-    missed, mass, push = 0, constants.mass, InPlane(force)
+    missed, push = 0, InPlane(force)
     for i in range(factor.shape[0]):
         stiffer = is_stiffer(asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i], 0.0)
         missed += 0 if stiffer else 1
     for i in range(factor.shape[0]):
+        mass = constants.mass * heavier[i]
         spring = spring_of(asked, i, mass, constants.damping_ratio * max(1.0, factor[i]))
         ax, ay, jx, jy = derivatives(offset, i, push.x[i] / mass, push.y[i] / mass, spring)
         for axis in range(2):

@@ -35,7 +35,10 @@ def _comply(world: int, seen: Seen, offset: Point, constants: Compliance, tables
     """Writes motion and ``moving``; returns how many stiffness setpoints are not positive definite."""
     s = Seen(seen.rows[:, :n])
     estimate = PistonEstimate(s.intermediate[: PistonEstimate.size])
-    missed = update_motion(Point(offset.rows[:, :n]), s.asked, s.user_force, constants, s.damping_factor, estimate.motion)
+    own, heavier = Point(offset.rows[:, :n]), scratch(1)[0, :n]
+    for i in range(n):
+        heavier[i] = 1.0
+    missed = update_motion(own, s.asked, s.user_force, constants, s.damping_factor, heavier, estimate.motion)
     mark_moving(estimate.motion, estimate.moving)
     return missed
 

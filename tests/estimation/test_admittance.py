@@ -39,10 +39,11 @@ class Follower:
         self.offset = Point(np.zeros((Point.size, lanes)))
         self._about = Compliance(Compliance.numbers(mass=mass, damping_ratio=ratio, period=period))
 
-    def update(self, force: Array, reference: Reference, factor: Array | None = None) -> Array:
+    def update(self, force: Array, reference: Reference, factor: Array | None = None, heavier: Array | None = None) -> Array:
         lanes = force.shape[1]
+        heavier = np.ones(lanes) if heavier is None else heavier
         motion, factor = Motion(np.empty((Motion.size, lanes))), np.zeros(lanes) if factor is None else factor
-        assert admittance.update_motion(self.offset, reference, force, self._about, factor, motion) == 0
+        assert admittance.update_motion(self.offset, reference, force, self._about, factor, heavier, motion) == 0
         return motion.rows
 
     def forecast(self, reference: Reference, force: Array, ticks: Array) -> Array:
@@ -183,3 +184,17 @@ def test_a_forecast_comes_true_where_nothing_new_happens(period: float) -> None:
         assert np.array_equal(motion, kept.update(force, at(tick)))
         for found in ahead[ticks == tick]:
             np.testing.assert_allclose(found, motion[:4], rtol=1e-11, atol=1e-13)
+
+
+def test_a_heavier_motion_is_that_of_the_heavier_mass() -> None:
+    """Lane by lane, against an exact solution whose mass is multiplied."""
+    factors, ticks = np.array([1.0, 2.5, 10.0]), 300
+    model, reference = Follower(len(factors)), asked(np.zeros((2, len(factors))), np.stack([COUPLED] * len(factors)))
+
+    def force(tick: int) -> Array:
+        return np.array([20.0 * (tick > 50), -8.0 * (tick > 120)])
+
+    got = np.stack([model.update(np.stack([force(k)] * len(factors), axis=1), reference, None, factors) for k in range(ticks)])
+    for lane, factor in enumerate(factors):
+        expected = exact_motion(force, [COUPLED], ticks, factor * MASS, DAMPING_RATIO)
+        np.testing.assert_allclose(got[:, :4, lane], expected[:, :4], atol=1e-6)

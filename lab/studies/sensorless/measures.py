@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import evaluate
-from baselines.bench.metrics import NORMAL_DENSITY
 from baselines.bench.statistics import penalize_lost
 from baselines.work.tasks import Result
 from birthsim_env.assembly import Arguments
@@ -16,15 +15,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.haptics.recording import record
 from lab.studies.haptics.release import flight
 from lab.studies.haptics.worlds import POSES, Condition, lost_lanes
+from lab.studies.held import hold
 from lab.studies.shaken import STIFFNESS, at_rest, shaken
 from lab.studies.stability.rig_port import Hand, RigPort
-
-CLAMP, DAMPING = 20000.0, 60.0
-"""N/m and N s/m of a hand that holds the head where it starts; assumed, the stiffest hand of
-``lab.studies.haptics.coupled``."""
-
-HELD, JUDGED = 5.0, 2.0
-"""s that the clamp holds, and of these the last that are judged."""
 
 PULLS, PULLED_AT = (190.0, 241.0), 4000.0
 """N along x, and the stiffness setpoint, N/m: the strongest forceps pull asked for, and almost all that cylinder 2 can hold."""
@@ -76,23 +69,9 @@ def _port(condition: Condition, places: Any, stiffness: float) -> tuple[RigPort,
 
 def _clamped(condition: Condition) -> dict[str, Any]:
     port, _, reference = _port(condition, POSES, STIFFNESS)
-
-    def hand(now: float, position: Array, velocity: Array) -> Array:
-        return np.asarray(-CLAMP * (position - reference.position) - DAMPING * velocity)
-
-    turned, direction, before = np.zeros((3, 4, port.lanes))
-    motion, force = [], []
-    for k in range(round(HELD / port.period)):
-        port.advance(hand)
-        step = np.sign(port.openings - before)
-        if k * port.period >= HELD - JUDGED:
-            turned += step * direction < 0
-            motion.append(port.motion()[:2].copy())
-            force.append(port.force.copy())
-        direction, before = np.where(step == 0, direction, step), port.openings.copy()
+    felt = hold(port, reference)
     return {
-        "clamped_mm": 1e3 * np.ptp(motion, axis=0).max(axis=0), "clamped_N": np.ptp(force, axis=0).max(axis=0),
-        "clamped_air": 60e3 * port.air / NORMAL_DENSITY / HELD, "turns": turned.mean(axis=0) / JUDGED,
+        "clamped_mm": 1e3 * felt["motion"], "clamped_N": felt["force"], "clamped_air": felt["air"], "turns": felt["turns"],
     }  # fmt: skip
 
 

@@ -1,0 +1,58 @@
+"""The best controller in the grip of a stiff hand, and what it does for other hands."""
+
+import numpy as np
+import pytest
+
+from baselines.admittance.controller import AdmittanceController
+from baselines.admittance.rows import Constants, Memory
+from birthsim_env.physics.rig.parameters import Parameters
+from lab.studies.haptics.worlds import POSES
+from lab.studies.held import hold
+from lab.studies.shaken import STIFFNESS, at_rest
+from lab.studies.stability.rig_port import RigPort
+
+SOFT = {"friction.bristle_stiffness": 1e4}
+"""Soft bristles, with which the head trembled by 40 N and more."""
+
+
+class Unfeeling(AdmittanceController):
+    """The adaptive law without an answer to a stiff hand."""
+
+    def controller_stages(self, sampled):
+        (own,) = super().controller_stages(sampled)
+        own.constants[Constants.feels_stiff_hand.first] = 0.0
+        return [own]
+
+
+def port(answers, mass=3.0):
+    """Rigs at ``POSES`` with an adaptive law that answers a stiff hand or does not; the reference, and the law."""
+    lanes = len(POSES)
+    law, reference = (AdmittanceController if answers else Unfeeling)(), at_rest(lanes, POSES, STIFFNESS)
+    rig = Parameters().replace({**SOFT, "mechanics.mass": mass})
+    return RigPort([rig] * lanes, reference, law, "honest", 5), reference, law
+
+
+@pytest.mark.parametrize("mass", [2.0, 4.5])
+def test_a_stiff_hand_is_shaken_by_a_quarter_of_what_a_loop_does_that_does_not_feel_it(mass):
+    shaken, calm = (hold(*port(answers, mass)[:2])["force"] for answers in (False, True))
+    assert shaken.max() > 20.0
+    assert calm.max() < 5.0
+    assert (calm < 0.25 * shaken.max()).all()
+
+
+def push(answers, newtons):
+    """Openings (T, 4, N) while a hand pushes along x for a second and lets go; and how far it was answered."""
+    held, _, law = port(answers)
+    openings, most = [], 0.0
+    for _ in range(2000):
+        held.advance(lambda now, position, _: np.array([[newtons * (0.3 < now < 1.3)], [0.0]]) + np.zeros_like(position))
+        openings.append(held.openings.copy())
+        most = max(most, float(Memory(law._memories[-1]).stiff_hand.felt.max()))
+    return np.array(openings), most
+
+
+@pytest.mark.parametrize("newtons", [5.0, 40.0])
+def test_openings_have_the_same_bits_where_no_stiff_hand_is_felt(newtons):
+    (found, most), (without, _) = push(True, newtons), push(False, newtons)
+    assert most == 0.0
+    np.testing.assert_array_equal(found, without)
