@@ -3,7 +3,7 @@
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -50,6 +50,13 @@ class Controller(Protocol):
     def command(self, measurement: Measurement, reference: Reference) -> Array: ...
 
     def reset(self, lanes: Mask | None = None) -> None: ...
+
+
+@runtime_checkable
+class Remarking(Protocol):
+    """A controller that has something to say of the control so far, which an evaluation prints."""
+
+    def remarks(self) -> list[str]: ...
 
 
 CommandFunction = Callable[[Measurement, Reference], Array]

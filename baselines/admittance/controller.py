@@ -19,6 +19,7 @@ from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, checked_gains, require_stiffness
 from baselines.estimation import inertial
 from baselines.estimation.admittance import DAMPING_RATIO
+from baselines.estimation.hand import friction_candidates
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import INTERMEDIATE, POSITION
@@ -102,7 +103,8 @@ class AdmittanceController(StagedController):
             sensor, where positions are samples and the rig as believed has one; such a loop needs no mass.
         identified: without a force sensor: whether the friction believed is the rig's to 5 %, as after ``birthsim identify``.
             Then a resting hand is found by the bristles and the head rests quietly; with half that friction it wanders by
-            10 mm. An acceleration sensor makes no use of it.
+            10 mm. With an acceleration sensor LuGre alone is then believed, so that small slow pushes are found sooner;
+            without this option other laws of friction are weighed too, and one that explains more takes its place.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests; less for a rig above ``HEAVY``.
             rest_push: by how much the position error of a resting piston is multiplied.
@@ -113,8 +115,9 @@ class AdmittanceController(StagedController):
             dead_zone: m, of a resting piston's error. lead_time: s, in which a spool follows.
             oscillation: m/s. Where the speed error swings beyond it, each sustained half wave multiplies the gain by yielding.
 
-    ``gain_fraction`` (2, N) is the gain that is left across and along cylinder 2. Raises ``ValueError`` for unknown gains
-    and values out of range.
+    ``gain_fraction`` (2, N) is the gain that is left across and along cylinder 2. Where an acceleration sensor tells the hand's
+    force, ``friction_trust`` (2, N) says how probable the friction believed is, and ``remarks()`` where it is not. Raises
+    ``ValueError`` for unknown gains and values out of range.
     """
 
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
@@ -154,13 +157,35 @@ class AdmittanceController(StagedController):
         super().__init__(parameters)
         self.reads_force = self._force_sensor = bool(force_sensor)
         self._learn, self._identified = bool(learn), bool(identified)
-        self._own = gains
+        self._own, self._candidates = gains, 0
 
     @property
     def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
         follower = Memory(self._memories[-1]).follower
         return np.stack([follower.across.fraction, follower.along.fraction])
+
+    @property
+    def friction_trust(self) -> Array:
+        """Probability, (2, N), that pistons 1 and 2 have the friction believed rather than another law of the same level.
+
+        1 where it is ``identified``, or where nothing weighs it: that takes an acceleration sensor, a controller that learns
+        without a force sensor, and positions that are samples."""
+        memory = Memory(self._memories[-1])
+        if not self._candidates:
+            return np.ones((2, memory.rows.shape[1]))
+        found: Array = friction_candidates.chances(memory.pistons.past)[friction_candidates.LUGRE]
+        return found
+
+    def remarks(self) -> list[str]:
+        """What is to be said of the control so far: that the friction believed is wrong, where it is."""
+        doubted = friction_candidates.DOUBTED
+        if not self._lanes or (self.friction_trust >= doubted).all():
+            return []
+        return [
+            f"another law of friction than the one believed explains how a piston moves (friction_trust below {doubted:g}), "
+            "and the hand's force follows that one: birthsim identify finds friction anew"
+        ]
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
@@ -181,6 +206,8 @@ class AdmittanceController(StagedController):
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
         follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
+        self._candidates = (1 if self._identified else friction_candidates.CANDIDATES) if weighed else 0
+        fresh = estimator.fresh_memory(rig, sampled, self._candidates)
         parameters = estimator.estimator_parameters(
             rig,
             sampled,
@@ -194,11 +221,12 @@ class AdmittanceController(StagedController):
             learns_mass=sampled and learns_force,
             feels_stiff_hand=learns_force,
             weighed=weighed,
+            rows_of_memory=len(fresh),
             believed_limit=estimator.BELIEVED_LIMIT if inert or fixed else estimator.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )
         constants = Constants.numbers(**parameters, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
-        own = ControllerStage(law.control, constants, estimator.fresh_memory(rig, sampled))
+        own = ControllerStage(law.control, constants, fresh)
         return [inertial.controller_stage(rig), own] if inert else [own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

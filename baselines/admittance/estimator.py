@@ -26,9 +26,11 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.hand import bristle_observer, force_bias, force_observer, inertial_force
+from baselines.estimation.hand import bristle_observer, force_bias, force_observer, friction_candidates, inertial_force
+from baselines.estimation.hand.friction_candidates import Bank
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
+from baselines.estimation.rows import Pistons
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Point
 from birthsim_env.physics.compiled import exact
@@ -139,7 +141,10 @@ def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorPa
     if constants.weighed > 0.0:
         place = int(constants.place)
         moving = Moving(seen.rows[place : place + Moving.size])
-        inertial_force.observe(hand, contact, memory.rest_detector, seen, moving, joints, pressures, noise, assumed, fresh)
+        bank = Bank(memory.pistons.past)
+        inertial_force.observe(
+            hand, contact, memory.rest_detector, bank, seen, moving, joints, pressures, noise, assumed, fresh
+        )
     elif constants.identified > 0.0:
         bristle_observer.observe(hand, contact, seen, joints, pressures, noise, assumed, fresh)
     elif constants.force_sensor == 0.0:
@@ -172,9 +177,13 @@ def estimate(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimato
     return missed
 
 
-def fresh_memory(rig: Parameters, sampled: bool) -> Array:
-    """``Memory`` of a lane that starts."""
+def fresh_memory(rig: Parameters, sampled: bool, candidates: int = 0) -> Array:
+    """``Memory`` of a lane that starts, with so many candidates for the friction where an acceleration sensor weighs them.
+
+    Their bank stands in the place of past positions, which only an observer of samples remembers."""
     whole, pistons = OscillationDetector.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
+    if candidates:
+        pistons = Pistons.lane(fresh=1.0, past=friction_candidates.fresh_bank(candidates))
     follower = Follower.lane(across=whole, along=whole, rest_across=whole, rest_along=whole)
     mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
     return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)

@@ -16,7 +16,7 @@ from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS, metrics_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
-from baselines.controller import CommandFunction, Controller, controller_of
+from baselines.controller import CommandFunction, Controller, Remarking, controller_of
 from baselines.driving import Driving, driving
 from baselines.named import make_controller
 from baselines.tables import aligned, markdown
@@ -67,6 +67,8 @@ class Evaluation:
         The controller's time per lane and call, us, which differs from run to run.
     traces : list of array
         Tracking errors over time, m, (T, lanes, 2) for each batch of episodes that ran side by side.
+    remarks : list of str
+        What the controller's ``remarks()``, if it has them, said at the ends of its batches, each sentence once.
 
     Examples
     --------
@@ -87,6 +89,7 @@ class Evaluation:
     success: list[bool] = field(default_factory=list)
     cost: float = float("nan")
     traces: list[Array] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
     def settled_error(self) -> dict[str, float]:
         """What screen and figure say of it: settled error, mm, as of ``summarize``, where a lost episode is infinitely bad."""
@@ -109,6 +112,7 @@ class Evaluation:
             "required_strength_ratio": self.required_strength_ratio,
             "returns": self.returns,
             "success": self.success,
+            "remarks": self.remarks,
         }
 
 
@@ -216,11 +220,17 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
     for one in evaluations:
         for name in ("seeds", "lost", "required_strength_ratio", "success", "traces"):
             getattr(whole, name).extend(getattr(one, name))
+        _remark(whole, one.remarks)
         for name in ("returns", "metrics"):
             for key, values in getattr(one, name).items():
                 getattr(whole, name)[key].extend(values)
     whole.cost = float(np.median([one.cost for one in evaluations]))
     return whole
+
+
+def _remark(whole: Evaluation, remarks: Sequence[str]) -> None:
+    """Adds what was not said yet."""
+    whole.remarks += [said for said in dict.fromkeys(remarks) if said not in whole.remarks]
 
 
 def _run_batch(
@@ -265,6 +275,7 @@ def _run_batch(
     result.success += (own.success > 0.0).tolist()
     for discount, sums in zip(DISCOUNTS, own.returns, strict=True):
         result.returns[discount] += sums.tolist()
+    _remark(result, controller.remarks() if isinstance(controller, Remarking) else [])
     result.traces.append(measures.error.transpose(0, 2, 1))
 
 
@@ -286,6 +297,7 @@ def overview(evaluations: list[Evaluation]) -> str:
         never = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())
         if never:
             unsaid.append(f"{one.controller}: {never} of {len(one.lost)} episodes were never settled and are left out above")
+        unsaid += [f"{one.controller}: {said}" for said in one.remarks]
     return "\n".join([aligned(("settled error, mm", "median", "95 %", "largest", "lost episodes"), rows), *unsaid])
 
 

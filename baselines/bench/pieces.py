@@ -103,7 +103,7 @@ def piece_under(
     trace = np.ascontiguousarray(np.concatenate(found.traces, axis=1), dtype="<f4")
     return {
         "seeds": found.seeds, "metrics": found.metrics, "lost": found.lost, "success": found.success, "cost": found.cost,
-        "required_strength_ratio": found.required_strength_ratio,
+        "required_strength_ratio": found.required_strength_ratio, "remarks": found.remarks,
         "returns": {str(discount): values for discount, values in found.returns.items()},
         "trace": {"shape": trace.shape, "float32": base64.b64encode(trace.tobytes()).decode()},
     }  # fmt: skip
@@ -126,6 +126,7 @@ def _evaluation(result: Result) -> Evaluation:
         result["success"],
         result["cost"],
         [flat.reshape(result["trace"]["shape"]).astype(np.float64)],
+        result["remarks"],
     )
 
 

@@ -12,6 +12,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 RIG = Parameters()
 P = Rig(parameter_column(RIG))
+LUGRE = bristle_filter.lugre(P)
 MASS, PERIOD, NOISE = RIG.mechanics.mass, 1e-3, 1e-4
 COULOMB, VISCOUS = RIG.cylinder2.coulomb_friction, RIG.cylinder2.viscous_friction
 S0, S1, STRIBECK = RIG.friction.bristle_stiffness, RIG.friction.bristle_damping, RIG.friction.stribeck_speed
@@ -43,9 +44,9 @@ def found(load, push, seconds, seed):
     time = np.arange(round(seconds / PERIOD)) * PERIOD
     path, rng = piston(time, lambda t: load(t) + push(t)), np.random.default_rng(seed)
     b, forces = filter_of(COULOMB), np.empty(len(time))
-    bristle_filter.begin(b, 1, 0, path[0], 0.0, 0.0, NOISE, P)
+    bristle_filter.begin(b, 1, 0, path[0], 0.0, 0.0, NOISE, LUGRE, P)
     for k, t in enumerate(time):
-        bristle_filter.predict(b, 1, 0, load(t - PERIOD / 2), 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, P, PERIOD)
+        bristle_filter.predict(b, 1, 0, load(t - PERIOD / 2), 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, 0.0, LUGRE, P, PERIOD)
         if k % 4 == 0:
             bristle_filter.correct(b, 1, 0, path[k] + NOISE * rng.standard_normal() - b.position[1, 0], NOISE)
         forces[k] = b.push[1, 0]
@@ -96,7 +97,7 @@ def test_covariances_are_carried_on_by_the_derivatives_of_the_step(speed, unseen
 
     def step(state, covariance=before):
         b = believed(state, covariance)
-        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, PUSH_NOISE, unseen, P, PERIOD)
+        bristle_filter.predict(b, 1, 0, -2.0, 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, unseen, LUGRE, P, PERIOD)
         return read(b)
 
     sizes = np.array([1e-7, 1e-6, 1e-8, 1e-4])
@@ -117,7 +118,7 @@ def test_a_speed_that_is_not_known_wears_bristles_down():
     deviation, bent, slack = 2e-4, 5.0 / S0, COULOMB * RIG.friction.static_ratio / S0
     # Chambers balance the bristles, so that the piston stays where it is; nothing is known to go together.
     b = believed([0.0, 0.0, bent, 0.0], np.diag([0.0, deviation**2, 0.0, 0.0]))
-    bristle_filter.predict(b, 1, 0, S0 * bent, 0.0, 1.0 / MASS, PUSH_NOISE, 1.0, P, PERIOD)
+    bristle_filter.predict(b, 1, 0, S0 * bent, 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, 1.0, LUGRE, P, PERIOD)
     speeds = deviation * np.random.default_rng(5).standard_normal(100_000)
     # The damping of bristles and piston takes up to 7 % of the deviation within the period; the mean has 0.2 % of sampling.
     assert 1.0 - b.bristle[1, 0] / bent == pytest.approx(PERIOD * np.mean(np.abs(speeds)) / slack, rel=0.1)
@@ -126,12 +127,12 @@ def test_a_speed_that_is_not_known_wears_bristles_down():
 def test_a_piston_without_friction_is_followed():
     p = Rig(parameter_column(RIG.replace({"cylinder2.coulomb_friction": 0.0})))
     b = filter_of(0.0)
-    bristle_filter.begin(b, 1, 0, 0.0, 0.0, 0.0, NOISE, p)
+    bristle_filter.begin(b, 1, 0, 0.0, 0.0, 0.0, NOISE, LUGRE, p)
     position, speed = 0.0, 0.0
     for k in range(500):
         speed += PERIOD * (6.0 - VISCOUS * speed) / MASS
         position += PERIOD * speed
-        bristle_filter.predict(b, 1, 0, 0.0, 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, p, PERIOD)
+        bristle_filter.predict(b, 1, 0, 0.0, 0.0, 1.0 / MASS, PUSH_NOISE, 0.0, 0.0, LUGRE, p, PERIOD)
         if k % 4 == 0:
             bristle_filter.correct(b, 1, 0, position - b.position[1, 0], NOISE)
     assert b.push[1, 0] == pytest.approx(6.0, abs=0.3)
@@ -149,9 +150,9 @@ def test_a_force_and_a_speed_correct_as_a_kalman_filter_asks_for(speed):
     by_speed, by_bristle = VISCOUS + S1 * (1.0 - S0 * abs(z) / level), S0 - S1 * S0 * abs(v) / level
     of_force, of_speed = np.array([0.0, -by_speed, -by_bristle, 1.0]), np.array([0.0, 1.0, 0.0, 0.0])
     weighed, gauged = believed(start, before), believed(start, before)
-    bristle_filter.weigh(weighed, 1, 0, f - drag + 0.7, 0.3, P)
+    bristle_filter.weigh(weighed, 1, 0, f - drag + 0.7, 0.3, 1.0, LUGRE, P)
     bristle_filter.gauge(gauged, 1, 0, v - 0.002, 0.003)
-    assert bristle_filter.drag(believed(start, before), 1, 0, P) == pytest.approx(drag)
+    assert bristle_filter.drag(believed(start, before), 1, 0, 1.0, LUGRE, P) == pytest.approx(drag)
     for b, h, off, noise in ((weighed, of_force, 0.7, 0.3), (gauged, of_speed, -0.002, 0.003)):
         gain = before @ h / (h @ before @ h + noise**2)
         state, covariance = read(b)

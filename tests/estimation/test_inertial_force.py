@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from baselines.estimation import observers
-from baselines.estimation.hand import held_force, inertial_force
+from baselines.estimation.hand import friction_candidates, held_force, inertial_force
 from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
+from baselines.estimation.hand.friction_candidates import Bank
 from baselines.estimation.hand.held_force import RestDetector
 from baselines.estimation.inertial import Moving
 from baselines.estimation.rows import AssumedParameters
@@ -36,6 +37,7 @@ class Observed:
 
     def __init__(self, rig, time=0.0):
         self.hand, self.contact, self.hold = (kind(np.zeros((kind.size, 1))) for kind in (Hand, ContactForce, RestDetector))
+        self.bank = Bank(friction_candidates.fresh_bank(1)[:, None])
         self.seen, self.moving, self.joints = (kind(np.zeros((kind.size, 1))) for kind in (Seen, Moving, Joints))
         self.assumed, self.fresh, self.seen.time[:] = AssumedParameters(observers.assumed_parameters(rig)), np.ones(1), time
 
@@ -45,6 +47,7 @@ class Observed:
             self.hand,
             self.contact,
             self.hold,
+            self.bank,
             self.seen,
             self.moving,
             self.joints,

@@ -8,6 +8,7 @@ creeps under its noise; here the model alone moves the bristles at rest.
 """
 
 import math
+from typing import NamedTuple
 
 from baselines.estimation import dry_friction
 from birthsim_env.physics.compiled.compilation import helper
@@ -38,6 +39,27 @@ LEAST_FRICTION, LEAST_SPEED = 1e-3, 1e-12
 """N and m/s; assumed: a piston is believed to have no less, so that its bristles bend by a distance and wear down one way."""
 
 
+class Law(NamedTuple):
+    """What is believed of a friction besides its level: LuGre, or what differs from it by where and when bristles yield.
+
+        z' = v - alpha(z) w(v) z/slack,   w(v) = max(|v|, ``creep``)
+    alpha is that of the elasto-plastic law with this ``breakaway`` (``friction.sliding_fraction``), or 1. A bristle that yields
+    at ``creep``, m/s, at least is a spring behind a damper of G/creep, as which (4) is integrated.
+    """
+
+    stiffness: float
+    damping: float
+    static_ratio: float
+    stribeck: float
+    breakaway: float
+    steepness: float
+    creep: float
+
+
+YIELDS, HOLDS = -1e9, 1e9
+"""Breakaways of bristles that yield at any deflection, where alpha is 1, and at none, where it is 0."""
+
+
 class Bristled(Rows):
     """What is believed of both pistons, and the covariances of what is believed."""
 
@@ -61,10 +83,17 @@ class Bristled(Rows):
 
 
 @helper
-def _slack(k: int, speed: float, level: float, p: Rig) -> float:
+def lugre(p: Rig) -> Law:
+    """LuGre of the rig as described."""
+    return Law(p.s0, p.s1, p.static_ratio, p.stribeck, YIELDS, 1.0, LEAST_SPEED)
+
+
+@helper
+def slack_at(k: int, speed: float, level: float, law: Law, p: Rig) -> float:
     """Deflection, m, at which the bristles of sliding piston ``k`` stay, at the ``level`` of its pressures."""
     coulomb = dry_friction.level_along(k, speed, level, p)
-    slack: float = max(friction.stribeck_level(speed, coulomb, p.static_ratio * coulomb, p.stribeck), LEAST_FRICTION) / p.s0
+    most = friction.stribeck_level(speed, coulomb, law.static_ratio * coulomb, law.stribeck)
+    slack: float = max(most, LEAST_FRICTION) / law.stiffness
     return slack
 
 
@@ -75,51 +104,91 @@ def _way(speed: float) -> float:
 
 
 @helper
-def _wear(speed: float, variance: float) -> float:
-    """Mean of |v|, m/s, where ``speed`` is known with a ``variance``, m2/s2; of a normal distribution to a tenth."""
-    return max(math.sqrt(speed * speed + 2.0 / math.pi * max(variance, 0.0)), LEAST_SPEED)
+def _yielding(bent: float, law: Law) -> tuple[float, float]:
+    """alpha of bristles that are bent by q = ``bent`` = z/slack along the motion, and q times its derivative to q."""
+    alpha: float = friction.sliding_fraction(bent, law.breakaway, law.steepness)
+    s = max(0.0, min(1.0, (bent - law.breakaway) * law.steepness))
+    return alpha, bent * 6.0 * s * (1.0 - s) * law.steepness
 
 
 @helper
-def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: float, noise: float, p: Rig) -> None:
+def _wear(speed: float, variance: float, bent: float, law: Law) -> tuple[float, float, float]:
+    """Mean of alpha w(v), m/s, where ``speed`` is known with a ``variance``, m2/s2, of a normal distribution to a tenth; its
+    derivative to ``speed``; and by how much the derivative of z' to -z/slack is larger, m/s, as alpha grows with z."""
+    fast = max(math.sqrt(speed * speed + 2.0 / math.pi * max(variance, 0.0)), law.creep)
+    share, grows = _yielding(bent, law)
+    return share * fast, share * (speed / fast), grows * fast
+
+
+@helper
+def begin(b: Bristled, k: int, i: int, position: float, speed: float, push: float, noise: float, law: Law, p: Rig) -> None:
     """Starts piston ``k`` of lane ``i`` at a measured ``position`` with a ``speed``, where friction and ``push``, N, balance
     the rest; its ``level`` is there already."""
     b.position[k, i], b.speed[k, i] = position, speed
-    b.bristle[k, i] = _slack(k, speed, b.level[k, i], p) * speed / (abs(speed) + SLIDES)
-    b.push[k, i] = push + p.s0 * b.bristle[k, i]
+    b.bristle[k, i] = slack_at(k, speed, b.level[k, i], law, p) * speed / (abs(speed) + SLIDES)
+    b.push[k, i] = push + law.stiffness * b.bristle[k, i]
     b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i] = noise * noise, 0.0, 0.0, 0.0
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = 0.0, 0.0, 0.0
-    bent = min(FIRST_BRISTLE, b.level[k, i]) / p.s0
+    bent = min(FIRST_BRISTLE, b.level[k, i]) / law.stiffness
     b.zz[k, i], b.zf[k, i], b.ff[k, i] = bent * bent, 0.0, FIRST_PUSH * FIRST_PUSH
     b.surprise[k, i] = 1.0
 
 
 @helper
 def predict(
-    b: Bristled, k: int, i: int, load: float, own: float, answer: float, push_noise: float, unseen: float, p: Rig, period: float
+    b: Bristled,
+    k: int,
+    i: int,
+    load: float,
+    own: float,
+    answer: float,
+    push_noise: float,
+    boost: float,
+    unseen: float,
+    law: Law,
+    p: Rig,
+    period: float,
 ) -> None:
     """Carries piston ``k`` of lane ``i`` on by a period: ``load``, N, of the chambers; ``own``, m/s2, without
     forces; ``answer``, 1/kg, to a force; ``push_noise``, N2/s, that drives f; ``unseen``, the part of the variance of v that is
     motion, which wears bristles down, rather than ignorance of a piston that rests."""
     viscous, level = (p.fv1 if k == 0 else p.fv2), b.level[k, i]
     outwards, inwards = dry_friction.level_along(k, 1.0, level, p), dry_friction.level_along(k, -1.0, level, p)
-    most = max(p.static_ratio * outwards, LEAST_FRICTION) / p.s0
-    least = -max(p.static_ratio * inwards, LEAST_FRICTION) / p.s0
+    most = max(law.static_ratio * outwards, LEAST_FRICTION) / law.stiffness
+    least = -max(law.static_ratio * inwards, LEAST_FRICTION) / law.stiffness
     v, z = b.speed[k, i], max(least, min(most, b.bristle[k, i]))
-    slack, fast = _slack(k, v, level, p), _wear(v, unseen * b.vv[k, i])
-    kept = 1.0 / (1.0 + period * fast / slack)
-    bends, relaxes = kept * (1.0 - v / fast * z / slack), kept * fast / slack
-    rate = own + answer * (load + b.push[k, i] - viscous * v - p.s0 * z - p.s1 * bends * v)
+    slack = slack_at(k, v, level, law, p)
+    fast, grows, firm = _wear(v, unseen * b.vv[k, i], _way(v) * z / slack, law)
+    kept = 1.0 / (1.0 + period * (fast + firm) / slack)
+    bends, relaxes = kept * (1.0 - grows * z / slack), kept * (fast + firm) / slack
+    rate = own + answer * (load + b.push[k, i] - viscous * v - law.stiffness * z - law.damping * bends * v)
     step = period * answer
-    av, az, af = 1.0 - step * (viscous + p.s1 * bends), -step * (p.s0 - p.s1 * relaxes), step
+    av, az, af = 1.0 - step * (viscous + law.damping * bends), -step * (law.stiffness - law.damping * relaxes), step
     v += period * rate
-    slack, fast = _slack(k, v, level, p), _wear(v, unseen * b.vv[k, i])
-    kept = 1.0 / (1.0 + period * fast / slack)
-    z = kept * (z + period * v)
-    bend = period * kept * (1.0 - v / fast * z / slack)
-    bv, bz, bf = bend * av, kept + bend * az, bend * af
+    slack = slack_at(k, v, level, law, p)
+    fast, grows, firm = _wear(v, unseen * b.vv[k, i], _way(v) * z / slack, law)
+    kept = 1.0 / (1.0 + period * (fast + firm) / slack)
+    z = kept * (z + period * v + period * firm / slack * z)
+    bend = period * kept * (1.0 - grows * z / slack)
     b.position[k, i] += period * v
     b.speed[k, i], b.bristle[k, i] = v, z
+    spread(b, k, i, (av, az, af), (bend * av, kept + bend * az, bend * af), push_noise, boost, period)
+
+
+@helper
+def spread(
+    b: Bristled,
+    k: int,
+    i: int,
+    of_speed: tuple[float, float, float],
+    of_bristle: tuple[float, float, float],
+    push_noise: float,
+    boost: float,
+    period: float,
+) -> None:
+    """Carries the covariances of piston ``k`` of lane ``i`` on by a period, from the derivatives of the next speed and of the
+    next deflection to speed, deflection and force; ``push_noise`` and ``boost`` are those of ``predict``."""
+    (av, az, af), (bv, bz, bf) = of_speed, of_bristle
     yv, yz, yf = b.yv[k, i], b.yz[k, i], b.yf[k, i]
     vv, vz, vf = b.vv[k, i], b.vz[k, i], b.vf[k, i]
     zz, zf, ff = b.zz[k, i], b.zf[k, i], b.ff[k, i]
@@ -135,7 +204,7 @@ def predict(
     b.yy[k, i] += period * (2.0 * ay + period * vv)
     b.yv[k, i], b.yz[k, i], b.yf[k, i] = ay + period * vv, by + period * vz, yf + period * avf
     b.vv[k, i], b.vz[k, i], b.vf[k, i] = vv, vz, avf
-    b.zz[k, i], b.zf[k, i], b.ff[k, i] = zz, bvf, ff + period * push_noise * (1.0 + alert)
+    b.zz[k, i], b.zf[k, i], b.ff[k, i] = zz, bvf, ff + period * push_noise * (1.0 + alert + boost)
 
 
 @helper
@@ -162,11 +231,14 @@ def _take(b: Bristled, k: int, i: int, y: float, v: float, z: float, f: float, v
 
 
 @helper
-def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> None:
-    """Takes a position sample of piston ``k`` of lane ``i``: what it is off, m, and its standard deviation, m."""
+def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> float:
+    """Takes a position sample of piston ``k`` of lane ``i``: what it is off, m, and its standard deviation, m; the variance of
+    the innovation, m2."""
     yy, yv, yz, yf = b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i]
     found = _take(b, k, i, yy, yv, yz, yf, yy + noise * noise, innovation)
     b.surprise[k, i] += SHARE * (found - b.surprise[k, i])
+    variance: float = yy + noise * noise
+    return variance
 
 
 @helper
@@ -177,27 +249,30 @@ def gauge(b: Bristled, k: int, i: int, speed: float, noise: float) -> None:
 
 
 @helper
-def drag(b: Bristled, k: int, i: int, p: Rig) -> float:
+def drag(b: Bristled, k: int, i: int, grip: float, law: Law, p: Rig) -> float:
     """Friction of piston ``k`` of lane ``i`` as believed, N."""
     v, z = b.speed[k, i], b.bristle[k, i]
-    bends = 1.0 - _way(v) * z / _slack(k, v, b.level[k, i], p)
-    found: float = ((p.fv1 if k == 0 else p.fv2) + p.s1 * bends) * v + p.s0 * z
+    slack = slack_at(k, v, b.level[k, i], law, p)
+    rate = grip * v - _yielding(_way(v) * z / slack, law)[0] * max(abs(v), law.creep) * z / slack
+    found: float = (p.fv1 if k == 0 else p.fv2) * v + law.damping * rate + law.stiffness * z
     return found
 
 
 @helper
-def weigh(b: Bristled, k: int, i: int, unexplained: float, noise: float, p: Rig) -> None:
+def weigh(b: Bristled, k: int, i: int, unexplained: float, noise: float, grip: float, law: Law, p: Rig) -> tuple[float, float]:
     """Takes what acceleration, weight and chambers leave unexplained of piston ``k`` of lane ``i``, N, f less friction, and
-    its standard deviation, N."""
+    its standard deviation, N; the innovation, N, and its variance, N2."""
     v, z = b.speed[k, i], b.bristle[k, i]
-    slack = _slack(k, v, b.level[k, i], p)
+    slack = slack_at(k, v, b.level[k, i], law, p)
+    share, grows = _yielding(_way(v) * z / slack, law)
     # Derivatives of f less friction, to v and z.
-    to_v = -((p.fv1 if k == 0 else p.fv2) + p.s1 * (1.0 - _way(v) * z / slack))
-    to_z = -(p.s0 - p.s1 * abs(v) / slack)
+    to_v = -((p.fv1 if k == 0 else p.fv2) + law.damping * (grip - share * _way(v) * z / slack))
+    to_z = -(law.stiffness - law.damping * (share + grows) * max(abs(v), law.creep) / slack)
     yh = to_v * b.yv[k, i] + to_z * b.yz[k, i] + b.yf[k, i]
     vh = to_v * b.vv[k, i] + to_z * b.vz[k, i] + b.vf[k, i]
     zh = to_v * b.vz[k, i] + to_z * b.zz[k, i] + b.zf[k, i]
     fh = to_v * b.vf[k, i] + to_z * b.zf[k, i] + b.ff[k, i]
-    off = unexplained - (b.push[k, i] - drag(b, k, i, p))
-    found = _take(b, k, i, yh, vh, zh, fh, to_v * vh + to_z * zh + fh + noise * noise, off)
+    off, variance = unexplained - (b.push[k, i] - drag(b, k, i, grip, law, p)), to_v * vh + to_z * zh + fh + noise * noise
+    found = _take(b, k, i, yh, vh, zh, fh, variance, off)
     b.stirred[k, i] += FORCE_SHARE * (found - b.stirred[k, i])
+    return off, variance

@@ -58,7 +58,7 @@ def observe(
         _, _, _, _, _, kappa, sine, cosine = pose
         sampled = seen.position_time[i] - contact.newest[i]
         contact.newest[i] = seen.position_time[i]
-        carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, 0.0, p, period, fresh[i] > 0.0)
+        carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, p, period, fresh[i] > 0.0)
         if sampled > 0.0:
             see(b, i, sample, joints, kappa, seen.time[i] - seen.position_time[i], noise[i])
         across, along = -b.push[0, i] / kappa, b.push[1, i]

@@ -13,6 +13,18 @@ LATE = 0.002
 
 
 @helper
+def loads(i: int, joints: Joints, air: PerChamber, pose: tuple[float, ...], p: Rig) -> tuple[float, float, float, float]:
+    """Forces of the chambers along both pistons of lane ``i``, N, and their accelerations without any force, m/s2."""
+    r4, r2, w, s2, _, kappa, sine, cosine = pose
+    v1, v2 = joints.speed[0, i], joints.speed[1, i]
+    own1 = mechanics.acceleration1(0.0, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
+    own2 = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity)
+    load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
+    load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere)
+    return load1, load2, own1, own2
+
+
+@helper
 def carry(
     b: Bristled,
     i: int,
@@ -21,29 +33,25 @@ def carry(
     pose: tuple[float, ...],
     noise: float,
     push_noise: float,
-    unseen: float,
     p: Rig,
     period: float,
     new: bool,
-) -> tuple[float, float]:
-    """Carries both pistons of lane ``i`` on by a period, or starts them where ``joints`` are; forces of the chambers, N.
+) -> None:
+    """Carries both pistons of lane ``i`` on by a period, or starts them where ``joints`` are.
 
-    ``noise``, m, is that of a position sample; ``push_noise`` and ``unseen`` are those of ``bristle_filter.predict``.
+    ``noise``, m, is that of a position sample; ``push_noise`` is that of ``bristle_filter.predict``.
     """
-    r4, r2, w, s2, _, kappa, sine, cosine = pose
-    v1, v2 = joints.speed[0, i], joints.speed[1, i]
-    own1 = mechanics.acceleration1(0.0, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
-    own2 = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity)
-    load1 = mechanics.piston_force(air.p1[i], air.n1[i], p.area_p1, p.area_n1, p.atmosphere)
-    load2 = mechanics.piston_force(air.p2[i], air.n2[i], p.area_p2, p.area_n2, p.atmosphere)
+    kappa, law = pose[5], bristle_filter.lugre(p)
+    load1, load2, own1, own2 = loads(i, joints, air, pose, p)
     for k in range(2):
         b.level[k, i] = dry_friction.level_at(k, air.rows, i, p)
     if new:
-        bristle_filter.begin(b, 0, i, joints.position[0, i], v1, -load1 - own1 * p.mass * kappa * kappa, noise / kappa, p)
-        bristle_filter.begin(b, 1, i, joints.position[1, i], v2, -load2 - own2 * p.mass, noise, p)
-    bristle_filter.predict(b, 0, i, load1, own1, p.inverse_mass / (kappa * kappa), push_noise, unseen, p, period)
-    bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, push_noise, unseen, p, period)
-    return load1, load2
+        start1, start2 = -load1 - own1 * p.mass * kappa * kappa, -load2 - own2 * p.mass
+        bristle_filter.begin(b, 0, i, joints.position[0, i], joints.speed[0, i], start1, noise / kappa, law, p)
+        bristle_filter.begin(b, 1, i, joints.position[1, i], joints.speed[1, i], start2, noise, law, p)
+    answer1 = p.inverse_mass / (kappa * kappa)
+    bristle_filter.predict(b, 0, i, load1, own1, answer1, push_noise, 0.0, 0.0, law, p, period)
+    bristle_filter.predict(b, 1, i, load2, own2, p.inverse_mass, push_noise, 0.0, 0.0, law, p, period)
 
 
 @helper

@@ -14,7 +14,7 @@ from birthsim_env.physics.compiled.records import Rows, row, rows
 QUICK, SLOW = 10.0, 3.0
 """1/s, of the low-passes on which a rest is judged; the first found by trial, the second assumed."""
 
-STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 2.5
+STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 5.0, 1.3
 """N; found by trial. Larger limits miss small pushes, smaller ones let noise end a rest."""
 
 SETTLES = 0.9

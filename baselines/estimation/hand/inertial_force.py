@@ -1,20 +1,22 @@
 """The hand's force with an acceleration sensor: what moves the head, less what pressures, weight and friction explain.
 
     F = m (a - g) - J^-T (F_chambers - friction)
-Friction is that of bristles that ``bristle_filter`` carries on through rest and motion. A sliding piston shows them by its
-speed, which ``inertial`` finds without a model of rig or hand. At rest that speed is noise, which would wear them down, and the
-model of the rig moves them instead. What is left of the noise at rest is held (``held_force``).
+Friction is that of candidates that ``friction_candidates`` carries on through rest and motion and weighs. A sliding piston
+shows its bristles by its speed, which ``inertial`` finds without a model of rig or hand. At rest that speed is noise, which
+would wear them down, and the model of the rig moves them instead. What is left of the noise at rest is held (``held_force``).
 
 What is left at the start, before a hand comes, is taken for an error of the mass and of the pressure cells.
 """
 
 import math
 
-from baselines.estimation.hand import bristle_filter, force_bias, held_force
+from baselines.estimation import dry_friction
+from baselines.estimation.hand import force_bias, friction_candidates, held_force
 from baselines.estimation.hand.bristle_filter import SLIDES
 from baselines.estimation.hand.bristle_observer import ContactForce
-from baselines.estimation.hand.bristled_pistons import carry, see
+from baselines.estimation.hand.bristled_pistons import LATE, loads
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
+from baselines.estimation.hand.friction_candidates import Bank
 from baselines.estimation.hand.held_force import RestDetector
 from baselines.estimation.inertial import Moving
 from baselines.estimation.rows import AssumedParameters
@@ -47,6 +49,7 @@ def observe(
     hand: Hand,
     contact: ContactForce,
     detector: RestDetector,
+    bank: Bank,
     seen: Signals,
     moving: Moving,
     joints: Joints,
@@ -55,11 +58,12 @@ def observe(
     assumed: AssumedParameters,
     fresh: Array,
 ) -> None:
-    """Carries ``hand``, ``contact`` and ``detector`` on by one period.
+    """Carries ``hand``, ``contact``, ``detector`` and ``bank`` on by one period.
 
-    ``moving`` is the end effector, ``pressures`` (4, N), Pa, the chambers', ``noise`` (N,), m, that of a position sample.
+    ``bank`` has the candidates for friction, ``moving`` is the end effector, ``pressures`` (4, N), Pa, the chambers', ``noise``
+    (N,), m, that of a position sample.
     """
-    p, period, b, air = assumed.rig, assumed.period, contact.pistons, PerChamber(pressures)
+    p, period, air = assumed.rig, assumed.period, PerChamber(pressures)
     sample, bare = Joints(scratch(Joints.size)), scratch(2)[:, : fresh.shape[0]]
     piston_motion(seen.rows[POSITION : POSITION + Point.size], p, sample.rows, fresh.shape[0])
     share = period / (1.0 / QUICKNESS + period)
@@ -68,23 +72,38 @@ def observe(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         _, _, _, _, _, kappa, sine, cosine = pose
-        sampled = seen.position_time[i] - contact.newest[i]
+        is_sampled, new = seen.position_time[i] > contact.newest[i], fresh[i] > 0.0
         contact.newest[i] = seen.position_time[i]
-        load1, load2 = carry(b, i, joints, air, pose, noise[i], PUSH_NOISE, UNSEEN, p, period, fresh[i] > 0.0)
+        age = seen.time[i] - seen.position_time[i]
+        load1, load2, own1, own2 = loads(i, joints, air, pose, p)
         ax, ay = moving.acceleration[0, i], moving.acceleration[1, i] + p.gravity
         left1 = -kappa * p.mass * (ax * cosine + ay * sine) - load1
         left2 = p.mass * (ax * sine - ay * cosine) - load2
+        if new:
+            friction_candidates.begin(bank, i)
+        bank.since[i] += period
+        drag1, drag2 = 0.0, 0.0
         for k in range(2):
-            v = joints.speed[k, i]
-            bristle_filter.gauge(b, k, i, v, max(SPEED_SLIDING, SPEED_AT_REST / (1.0 + (v / SLIDES) ** 2)))
-        bristle_filter.weigh(b, 0, i, left1, kappa * WEIGHED * p.mass, p)
-        bristle_filter.weigh(b, 1, i, left2, WEIGHED * p.mass, p)
-        if sampled > 0.0:
-            see(b, i, sample, joints, kappa, seen.time[i] - seen.position_time[i], noise[i])
-        across = -(left1 + bristle_filter.drag(b, 0, i, p)) / kappa
-        along = left2 + bristle_filter.drag(b, 1, i, p)
+            v, lever = joints.speed[k, i], kappa if k == 0 else 1.0
+            told = friction_candidates.Seen(
+                joints.position[k, i],
+                v,
+                max(SPEED_SLIDING, SPEED_AT_REST / (1.0 + (v / SLIDES) ** 2)),
+                load1 if k == 0 else load2,
+                own1 if k == 0 else own2,
+                p.mass * lever * lever,
+                dry_friction.level_at(k, air.rows, i, p),
+                left1 if k == 0 else left2,
+                lever * WEIGHED * p.mass,
+                is_sampled,
+                sample.position[k, i] + v * age,
+                noise[i] / lever + LATE * abs(v),
+            )
+            drag = friction_candidates.follow(bank, k, i, told, PUSH_NOISE, UNSEEN, p, period, new)
+            drag1, drag2 = drag if k == 0 else drag1, drag2 if k == 0 else drag
+        across, along = -(left1 + drag1) / kappa, left2 + drag2
         x, y = across * cosine + along * sine, across * sine - along * cosine
-        hand.filtered[0, i] = 0.0 if fresh[i] > 0.0 else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
-        hand.filtered[1, i] = 0.0 if fresh[i] > 0.0 else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
+        hand.filtered[0, i] = 0.0 if new else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
+        hand.filtered[1, i] = 0.0 if new else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
     force_bias.tare(hand.bias, seen.time, hand.filtered, MOST_BIAS, math.inf, period, bare)
     held_force.hold(detector, bare, period, fresh, hand.force)
