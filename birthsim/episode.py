@@ -8,9 +8,9 @@ from birthsim.command_line.settings import RANDOMIZE
 from birthsim.command_line.worlds import check_environment, with_options
 from birthsim.recorded import driven, record
 from birthsim_env.files import make_folder, whole_results
+from birthsim_env.ids import rig_for
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import load_parameters
 
 if TYPE_CHECKING:
     from birthsim.commands.run import Settings
@@ -21,7 +21,7 @@ FIELDS = ("time", "position", "compliant_target", "tracking_error", "user_force"
 
 def run(settings: "Settings") -> None:
     """Run an episode, print and draw it."""
-    rig = load_parameters(settings.parameters)
+    rig = rig_for(settings.env, settings.parameters)
     check_environment(settings.env)
     name = with_options([settings.controller], settings.set)[0]
     randomize = RANDOMIZE[settings.randomize]

@@ -11,15 +11,14 @@ from birthsim.command_line.worlds import check_environment, check_world, policy_
 from birthsim.commands.evaluate import Settings
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, whole_results, write_json, write_text
-from birthsim_env.ids import environment_ids
+from birthsim_env.ids import environment_ids, rig_for
 from birthsim_env.parts.drawn.randomization import described
-from birthsim_env.physics.rig.parameters import load_parameters
 
 
 def run(settings: Settings) -> None:
     """Run the episodes that the folder lacks; write and print tables."""
     settings.controller = settings.controller or (["backstepping"] if settings.policy is None else ["residual"])
-    rig = load_parameters(settings.parameters)
+    rig = rig_for(settings.env, settings.parameters)
     if settings.env not in environment_ids():  # one with a law inside may be
         check_environment(settings.env)
     # Processes that work beside this one find an id with a controller inside by the package that registers it.

@@ -18,11 +18,11 @@ from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn, check_points
 from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
 from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
-from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.parts.scenarios import find_scenario, rig_of
 from birthsim_env.parts.sensors.model import drawn_by, models_that_draw
 from birthsim_env.parts.times import called, check_times
 from birthsim_env.physics.rig.arrays import floats_of
-from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, near, shown, whole_of
 from birthsim_env.registry import entry
 from birthsim_env.simulation import Simulation
@@ -140,15 +140,17 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     refuse_unknown(arguments)
     given: Arguments = {**DEFAULTS, **arguments}
     randomize, actuation, duration = given["randomize"], given["actuation"], given["duration"]
-    table = find_scenario(scenario)
-    rig = load_parameters(given["parameters"])
+    rig = rig_of(scenario, given["parameters"])
+    table = find_scenario(scenario).on(rig)
     valves = one_of("valves", given["valves"], VALVE_LAYOUTS)
     sensors = entry("sensors", given["sensors"]).name
     one_of("force_sensor", given["force_sensor"], (True, False))
     one_of("clip_actions", given["clip_actions"], (True, False))
     if not isinstance(actuation, Actuation | None):
         raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object of a class derived from Actuation")
-    chosen = actuation or ACTUATIONS[one_of("action_mode", given["action_mode"], tuple(ACTUATIONS))](valves)
+    chosen = actuation or ACTUATIONS[one_of("action_mode", given["action_mode"], tuple(ACTUATIONS))](
+        valves, rig.linkage.topology
+    )
     for name, length, most in (("size", chosen.size, MOST_ACTIONS), ("memory_names", len(chosen.memory_names), MOST_SHOWN)):
         if not length <= most:
             raise ValueError(f"actuation.{name} has a length of {length}; allowed: at most {most}")
@@ -177,7 +179,7 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     parts = trajectory, hand, stiffness, sensors, chosen
     simulation = Simulation(num_envs, rig, ranges, *parts, periods, threads, given["force_sensor"])
     limit = observation.LIMIT
-    names = (*map(str, observation.ENTRIES), *(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
+    names = (*map(str, observation.entries_of(rig)), *(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
     seen, acted = spaces.Box(-limit, limit, (len(names),), np.float32), spaces.Box(-1.0, 1.0, (chosen.size,), np.float32)
     size = checked_size("picture_size", given["picture_size"])
     how = lasts, float(given["policy_period"]), given["clip_actions"], table.title, size

@@ -5,7 +5,8 @@ from typing import Any, NoReturn
 from gymnasium.envs import registration
 from gymnasium.error import DeprecatedEnv
 
-from birthsim_env.parts.scenarios import environment_id, find_scenario
+from birthsim_env.parts.scenarios import environment_id, find_scenario, rig_of
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import Entry, follow
 
 NAMESPACE = "BirthSIM"
@@ -41,6 +42,14 @@ def environment_ids() -> list[str]:
     """All ids that make an environment, in the order of the alphabet."""
     found = registration.registry.items()
     return sorted(name for name, spec in found if spec.namespace == NAMESPACE and spec.entry_point != FORMER)
+
+
+def rig_for(environment: str, parameters: Any) -> Parameters:
+    """The rig of an environment id: ``parameters``, as ``load_parameters`` takes them, or its scenario's default."""
+    found = registration.registry.get(environment.rpartition(":")[2]) if isinstance(environment, str) else None
+    return (
+        rig_of(found.kwargs["scenario"], parameters) if found and found.namespace == NAMESPACE else load_parameters(parameters)
+    )
 
 
 def refuse_former(scenario: str, former: str, present: str, **_: Any) -> NoReturn:

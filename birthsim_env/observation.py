@@ -13,10 +13,11 @@ from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, com
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.compiled.lanes import FREE, Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.linkage import geometry, mechanics
 from birthsim_env.physics.linkage.inverse_kinematics import piston_motion
+from birthsim_env.physics.rig.parameters import Parameters
 
 LIMIT = 10.0
 """Bound of every observation entry, in units of its scale."""
@@ -55,6 +56,36 @@ ENTRIES = tuple(
     Entry(about.format(name), unit, scale) for (name, unit, about, _), scale in zip(Observation.entries(), SCALES, strict=True)
 )
 SIZE = len(ENTRIES)
+
+PER_CYLINDER = (Observation.piston, Observation.force, Observation.pneumatic_stiffness, Observation.pneumatic_setpoint)
+FIRST_PER_CYLINDER, AFTER_PER_CYLINDER = PER_CYLINDER[0].first, PER_CYLINDER[-1].first + 2
+STIFFNESS = Observation.stiffness.first
+"""Rows that pistons have one each of, which are neighbours, and those of the closed-loop stiffness; all others are vectors."""
+
+
+def entries_of(rig: Parameters) -> tuple[Entry, ...]:
+    """What a policy sees of a rig: on a rail one entry of each pair, along it or of its cylinder."""
+    if not rig.linkage.is_rail:
+        return ENTRIES
+    named = [(k, *entry) for k, entry in enumerate(Observation.entries())][1::2]
+    names = (
+        (k, name if FIRST_PER_CYLINDER <= k < AFTER_PER_CYLINDER else "along the rail", about) for k, name, _, about, _ in named
+    )
+    return tuple(Entry(about.format(name), ENTRIES[k].unit, ENTRIES[k].scale) for k, name, about in names)
+
+
+def size_of(nominal: Array) -> int:
+    """Number of ``entries_of`` a rig with parameters (PARAMETERS,)."""
+    return SIZE if nominal[FREE] > 0.0 else SIZE // 2
+
+
+@helper
+def _of_rail(pair: Array, k: int, p: Rig) -> float:
+    """What a rail has of the rows ``k`` and k + 1, a ``pair``: that along it, or of its cylinder."""
+    cosine, sine = p.sin_gamma3, -p.cos_gamma3  # of the inclination
+    first, second = (cosine * cosine, sine * sine) if k == STIFFNESS else (cosine, sine)
+    per_cylinder = FIRST_PER_CYLINDER <= k < AFTER_PER_CYLINDER
+    return float(pair[1] if per_cylinder else first * pair[0] + second * pair[1])
 
 
 @helper
@@ -96,12 +127,15 @@ def look(seen: Signals, action: Array, shown: Array, p: Rig, scales: Array, out:
         own.pneumatic_stiffness[1] = control_model.pneumatic_stiffness(
             pp2, pn2, p.area_p2, p.area_n2, max(half2 + y2, edge2), max(half2 - y2, edge2), p.index
         )
-        for k in range(scales.shape[0]):
-            out[i, k] = max(-LIMIT, min(LIMIT, own.rows[k] / scales[k]))
+        each = 1 if p.free > 0.0 else 2
+        size = scales.shape[0] // each
+        for k in range(size):
+            value = own.rows[k] if each == 1 else _of_rail(own.rows[2 * k : 2 * k + 2], 2 * k, p)
+            out[i, k] = max(-LIMIT, min(LIMIT, value / scales[each * k + each - 1]))
         for k in range(action.shape[0]):
-            out[i, scales.shape[0] + k] = action[k, i]
+            out[i, size + k] = action[k, i]
         for k in range(shown.shape[0]):
-            out[i, scales.shape[0] + action.shape[0] + k] = shown[k, i]
+            out[i, size + action.shape[0] + k] = shown[k, i]
 
 
 def observe(measurement: Measurement, reference: Reference, beside: Array, nominal: Array) -> NDArray[np.float32]:
@@ -110,8 +144,8 @@ def observe(measurement: Measurement, reference: Reference, beside: Array, nomin
     ``beside`` (M, N): the last action, and what an actuation remembers; ``nominal`` (PARAMETERS,) is the rig as its owner
     describes it: a policy does not know what randomisation drew.
     """
-    lanes = beside.shape[1]
-    out, seen = np.empty((lanes, SIZE + beside.shape[0]), dtype=np.float32), Signals(np.zeros((Signals.size, lanes)))
+    lanes, size = beside.shape[1], size_of(nominal)
+    out, seen = np.empty((lanes, size + beside.shape[0]), dtype=np.float32), Signals(np.zeros((Signals.size, lanes)))
     fill_measurement(seen.rows, measurement)
     seen.reference.rows[:] = reference.rows
     look(seen, beside, np.empty((0, lanes)), Rig(nominal), SCALES, out, lanes)

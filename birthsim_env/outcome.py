@@ -89,7 +89,7 @@ class Outcome:
     ) -> None:
         self.terms, self.ends = np.zeros((reward.Terms.size, lanes)), np.zeros((Ends.size, lanes))
         self.rows: Array = np.zeros((info.Info.size, lanes))
-        self.seen: NDArray[np.float32] = np.zeros((lanes, observation.SIZE + actions + shown), dtype=np.float32)
+        self.seen: NDArray[np.float32] = np.zeros((lanes, observation.size_of(nominal) + actions + shown), dtype=np.float32)
         self._memory: Array = np.zeros((Memory.size + actions, lanes))
         # Half a control period less: the clock of a jump counts in sums of them.
         limits = reward.Limits.numbers(

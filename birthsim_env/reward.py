@@ -109,8 +109,9 @@ def assess(
     """
     steps, kept = limits.period / 0.01, exact.exp(-limits.period / GIVING_WAY)
     unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
-    state = world.state
+    state, p = world.state, world.rig
     for i in range(n):
+        along_error, along_speed = 0.0, 0.0
         offset = compliant_offset(reference, world.force[0, i], world.force[1, i], i)
         jumped = world.since_jump[i] < limits.jumped_below
         error, speed = 0.0, 0.0
@@ -119,9 +120,17 @@ def assess(
             due = kept * (lag.remaining[axis, i] + (change if jumped else 0.0))
             asked = offset[axis] - due
             rate = (asked - lag.offset[axis, i] + lag.remaining[axis, i]) / limits.period
-            error += abs(world.motion.position[axis, i] - reference.position[axis, i] - asked)
-            speed += abs(world.motion.velocity[axis, i] - reference.velocity[axis, i] - rate)
+            off = world.motion.position[axis, i] - reference.position[axis, i] - asked
+            fast = world.motion.velocity[axis, i] - reference.velocity[axis, i] - rate
+            error += abs(off)
+            speed += abs(fast)
+            direction = p[at.SIN_GAMMA3, i] if axis == 0 else -p[at.COS_GAMMA3, i]
+            along_error += direction * off
+            along_speed += direction * fast
             lag.offset[axis, i], lag.remaining[axis, i] = offset[axis], due
+        # On a rail there is one axis, whatever its inclination.
+        error = error if p[at.FREE, i] > 0.0 else abs(along_error)
+        speed = speed if p[at.FREE, i] > 0.0 else abs(along_speed)
         cost = exact.log1p(min(FARTHEST, error) / ERROR_UNIT)
         hunting = exact.log1p(min(FASTEST, speed) / SPEED_UNIT)
         turned, effort = 0.0, 0.0

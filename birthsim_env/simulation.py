@@ -16,7 +16,17 @@ from birthsim_env.loop.loop import MixedLoop, Place
 from birthsim_env.loop.pipeline import ORDER, Called, Pipeline, Step, group_of
 from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.loop.stage import Part, Stage, stage_of
-from birthsim_env.loop.world import AT_PLACE, GOES_ON, ON_TARGET, Start, jump_stage, no_force_stage, plant_stage, start_stages
+from birthsim_env.loop.world import (
+    AT_PLACE,
+    GOES_ON,
+    ON_TARGET,
+    Start,
+    guide_stage,
+    jump_stage,
+    no_force_stage,
+    plant_stage,
+    start_stages,
+)
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import check_knots, checked_start
 from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
@@ -247,7 +257,7 @@ class Simulation(Parts):
             "target": group_of("target", [target], begins=True),
             "setpoints": group_of("setpoints", [setpoints], begins=True),
             "start": group_of("start", start_stages(self.start, self.nominal, plant), begins=True, period=False),
-            "hand": group_of("hand", [hand], begins=True),
+            "hand": group_of("hand", [hand, *([guide_stage()] if self.parameters.linkage.is_rail else [])], begins=True),
             "jumps": [Step("jumps", jumps, begins, built_in=True)],
             "sensors": group_of("sensors", [measure, *([] if self.force_sensor else [no_force_stage()])], begins=True),
             "outcome": [] if self.outcome is None else [self.outcome.step()],

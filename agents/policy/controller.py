@@ -11,7 +11,7 @@ from agents.policy.files import read_policy
 from agents.policy.network import PolicyNetwork
 from agents.policy.seeds import best_policy
 from agents.policy.stage import policy_stage
-from agents.residual.corrected import CorrectedController, memory_names, observation_names
+from agents.residual.corrected import CorrectedController, action_names, memory_names, observation_names
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import policy_periods
 from birthsim_env.loop.signals import Mask
@@ -49,7 +49,7 @@ class ResidualController(CorrectedController):
         if callable(policy):
             self._function, settings = policy, settings or ResidualSettings()
         elif settings is None:
-            self._network, settings = _stored(policy)
+            self._network, settings = _stored(policy, rig)
         else:
             raise ValueError(f"settings = {shown(settings)} beside policy = {shown(policy)}; allowed: beside a function")
         super().__init__(rig, settings)
@@ -77,8 +77,8 @@ class ResidualController(CorrectedController):
         if (lanes, sampled) != (self._lanes, self._sampled):
             self._before = [] if self.settings.force_sensor else [no_force_stage()]
             if self._network is not None:
-                shown = len(memory_names(self.settings))
-                own = policy_stage(self._network, self._periods, self.settings.size, shown, self._p, lanes)
+                shown = len(memory_names(self.settings, self.parameters))
+                own = policy_stage(self._network, self._periods, self.size, shown, self._p, lanes)
                 self._before = [*self._before, own]
             else:
                 self._before = [*self._before, self._ask]
@@ -94,7 +94,7 @@ class ResidualController(CorrectedController):
         if self._calls % self._periods == 0:
             measurement, reference = self.good_signals()
             seen = observe(measurement, reference, np.concatenate([self.action, self.shown]), self._p)
-            actions, expected = self._function(seen), (self.action.shape[1], self.settings.size)
+            actions, expected = self._function(seen), (self.action.shape[1], self.size)
             if np.shape(actions) != expected:
                 raise ValueError(f"policy gives actions {np.shape(actions)}; allowed: {expected}")
             array = np.asarray(actions, dtype=np.float64)
@@ -104,10 +104,11 @@ class ResidualController(CorrectedController):
         self._calls += 1
 
 
-def _stored(place: str | Path) -> tuple[PolicyNetwork, ResidualSettings]:
+def _stored(place: str | Path, rig: Parameters) -> tuple[PolicyNetwork, ResidualSettings]:
     """The network of a folder and its settings."""
     stored = read_policy(best_policy(place))
-    network, seen, said = stored.network, len(observation_names(stored.settings)), stored.settings.size
+    names = observation_names(stored.settings, rig), action_names(stored.settings, rig)
+    network, (seen, said) = stored.network, map(len, names)
     if (network.inputs, network.outputs) != (seen, said):
         raise ValueError(
             f"policy = {str(place)!r} maps {network.inputs} to {network.outputs} numbers; allowed: {seen} to {said}"

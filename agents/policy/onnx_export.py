@@ -22,6 +22,7 @@ from agents.policy.files import Policy
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork, Weights
 from agents.residual.corrected import action_names, observation_names
 from birthsim_env.files import whole_file
+from birthsim_env.ids import rig_for
 from birthsim_env.observation import LIMIT
 
 FORMAT = "birthsim-residual-onnx-1"
@@ -95,11 +96,10 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     Raises ``ValueError`` for a network that does not fit the settings, and where the file, run by onnxruntime, differs from
     PyTorch or from ``PolicyNetwork`` by more than ``TOLERANCE``; nothing is written then.
     """
-    network, names = policy.network, observation_names(policy.settings)
-    if (network.inputs, network.outputs) != (len(names), policy.settings.size):
-        raise ValueError(
-            f"policy maps {network.inputs} to {network.outputs} numbers; allowed: {len(names)} to {policy.settings.size}"
-        )
+    network, rig = policy.network, rig_for(policy.environment, None)
+    names, actions = observation_names(policy.settings, rig), action_names(policy.settings, rig)
+    if (network.inputs, network.outputs) != (len(names), len(actions)):
+        raise ValueError(f"policy maps {network.inputs} to {network.outputs} numbers; allowed: {len(names)} to {len(actions)}")
     if path.is_dir():
         raise ValueError(f"{str(path)!r} is a folder; allowed: the name of a file")
     module = PolicyModule(network).eval()
@@ -111,7 +111,7 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
             "environment": policy.environment,
             "settings": json.dumps(policy.settings.to_dict()),
             "observations": json.dumps(names),
-            "actions": json.dumps(action_names(policy.settings)),
+            "actions": json.dumps(actions),
         },
     )
     onnx.checker.check_model(model, full_check=True)

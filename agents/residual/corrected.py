@@ -23,12 +23,13 @@ from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import ACTION, SHOWN, Seen
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import scratch
-from birthsim_env.observation import ENTRIES, LIMIT
+from birthsim_env.observation import LIMIT, entries_of
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.topology import refuse_rail
 
 STIFFEST = 4000.0
 """N/m: the law is made no stiffer than that, unless more is asked for. With 6000 rigs of 2.4 kg and less with valves of 7 ms
@@ -66,22 +67,28 @@ UNEXPLAINED = tuple(
 """What is said of ``unexplained.Forces``."""
 
 
-def action_names(settings: ResidualSettings) -> tuple[str, ...]:
-    """What each entry of an action says."""
-    return VALVE_NAMES if settings.law == NO_LAW else NAMES[: settings.size]
+def action_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> tuple[str, ...]:  # noqa: B008  frozen
+    """What each entry of an action says, on a ``rig``."""
+    if not rig.linkage.is_rail:
+        return VALVE_NAMES if settings.law == NO_LAW else NAMES[: settings.size]
+    if settings.impedance != "fixed" or settings.informed:
+        refuse_rail(rig, "a residual with impedance other than 'fixed', or informed,")
+    topology = rig.linkage.topology
+    return tuple(VALVE_NAMES[k] for k in topology.chambers) if settings.law == NO_LAW else NAMES[topology.cylinders[0] : 2]
 
 
-def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
+def memory_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> tuple[str, ...]:  # noqa: B008  frozen
     """What each row of ``CorrectedController.memory`` says."""
-    smooth = (f"smoothed action: {name}" for name in action_names(settings))
-    left = (f"fraction of the authority on cylinder {i}, 1" for i in (1, 2))
-    return (*smooth, *left, *UNEXPLAINED, *(features.ENTRIES if settings.informed else ()))
+    cylinders = rig.linkage.topology.cylinders
+    smooth = (f"smoothed action: {name}" for name in action_names(settings, rig))
+    left = (f"fraction of the authority on cylinder {i + 1}, 1" for i in cylinders)
+    return (*smooth, *left, *UNEXPLAINED[cylinders[0] :: 3 - len(cylinders)], *(features.ENTRIES if settings.informed else ()))
 
 
-def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
+def observation_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> tuple[str, ...]:  # noqa: B008  frozen
     """What each entry of an observation says, as in the environments' ``observation_names``."""
-    last = (f"last action: {name}" for name in action_names(settings))
-    return (*map(str, ENTRIES), *last, *memory_names(settings))
+    last = (f"last action: {name}" for name in action_names(settings, rig))
+    return (*map(str, entries_of(rig)), *last, *memory_names(settings, rig))
 
 
 class Correction(Rows):
@@ -113,6 +120,7 @@ class Constants(Numbers):
     has_law = number("1", "1 with a law")
     stiffens = number("1", "1 where the impedance has a stiffness")
     damps = number("1", "1 where it has a damping")
+    first = number("1", "the first cylinder that is corrected; 1 on a rail, which has one")
     told = number("1", "how many entries of ``features.EstimatorFeatures`` are shown")
     period = number("s", "control period")
     rig = part(Rig, "the rig as described")
@@ -147,12 +155,13 @@ def stiffen(force: Array, powers: Array, asked: Reference, n: int) -> None:
 @helper
 def _correct(action: Array, limiter: authority.Limiter, constants: Constants, smooth: Action, said: Correction, n: int) -> None:
     """Writes what actions (size, n) say; ``smooth`` goes on by one period towards them."""
-    size, most, left = action.shape[0], constants.authority, limiter.left
+    size, most, left, first = action.shape[0], constants.authority, limiter.left, int(constants.first)
     for i in range(n):
-        for k in range(2):
-            strength = most * left[k, i]
-            said.force[k, i] = strength * smooth.force[k, i]
-            said.rate[k, i] = strength / constants.time_constant * (action[k, i] - smooth.force[k, i])
+        said.force[0, i], said.rate[0, i], said.powers[0, i], said.powers[1, i] = 0.0, 0.0, 0.0, 0.0
+        for k in range(first, 2):
+            strength, smoothed = most * left[k, i], smooth.rows[k - first, i]
+            said.force[k, i] = strength * smoothed
+            said.rate[k, i] = strength / constants.time_constant * (action[k - first, i] - smoothed)
             said.powers[k, i] = max(smooth.powers[k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
         said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth.damping[i], 0.0)) if size > 4 else 0.0
         for k in range(size):
@@ -161,6 +170,7 @@ def _correct(action: Array, limiter: authority.Limiter, constants: Constants, sm
 
 @kernel
 def _stage(world: int, seen: Seen, memory: Memory, constants: Constants, tables: int, lane: int, n: int) -> int:
+    first = int(constants.first)
     size, found, said = (
         int(constants.actions),
         ObservedPistons(seen.intermediate[: ObservedPistons.size]),
@@ -179,16 +189,18 @@ def _stage(world: int, seen: Seen, memory: Memory, constants: Constants, tables:
         for k in range(2):
             seen.feedforward.force[k, i], seen.feedforward.rate[k, i] = said.force[k, i], said.rate[k, i]
             said.powers[k, i] = said.powers[k, i] - limiter.softness[i]
-            shown[size + k, i] = limiter.left[k, i]
+        for k in range(first, 2):
+            shown[size + k - first, i] = limiter.left[k, i]
         seen.damping_factor[i] = said.damping_factor[i] if constants.damps > 0.0 else 0.0
-        for k in range(unexplained.Forces.size):
-            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, memory.unexplained.rows[k, i] / constants.unit))
+        for k in range(unexplained.Forces.size // (1 + first)):
+            force = memory.unexplained.rows[(1 + first) * k + first, i]
+            shown[size + 2 - first + k, i] = max(-LIMIT, min(LIMIT, force / constants.unit))
         for k in range(int(constants.told)):
             shown[size + 2 + unexplained.Forces.size + k, i] = max(
                 -LIMIT, min(LIMIT, seen.intermediate[ObservedPistons.size + k, i])
             )
-        for valve in range(4 if constants.has_law == 0.0 else 0):
-            seen.opening[valve, i] = action[valve, i]
+        for valve in range(2 * first, 4 if constants.has_law == 0.0 else 0):
+            seen.opening[valve, i] = action[valve - 2 * first, i]
     if constants.stiffens > 0.0:
         stiffen(seen.user_force, said.powers, asked, n)
     return 0
@@ -204,13 +216,15 @@ class CorrectedController(StagedController):
         self.settings, self.reads_force = settings, settings.force_sensor
         # Every law takes forces to believe in; those that have an impedance also a damping factor.
         self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, self.parameters)
-        self.action: Array = np.zeros((settings.size, 0))
-        self.shown: Array = np.zeros((len(memory_names(settings)), 0))
+        self.size = len(action_names(settings, self.parameters))
+        self.action: Array = np.zeros((self.size, 0))
+        self.shown: Array = np.zeros((len(memory_names(settings, self.parameters)), 0))
 
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         settings, board = self.settings, self.parameters.electronics
         constants = Constants.numbers(
-            actions=settings.size,
+            actions=self.size,
+            first=self.parameters.linkage.topology.cylinders[0],
             authority=settings.authority,
             time_constant=settings.time_constant,
             level=authority.LEVEL,
@@ -248,7 +262,7 @@ class CorrectedController(StagedController):
         if self.action.shape[1] != len(lanes):
             self.action, self.shown = (np.zeros((len(rows), len(lanes))) for rows in (self.action, self.shown))
         self.action[:, lanes], self.shown[:, lanes] = 0.0, 0.0
-        self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
+        self.shown[self.size : self.size + len(self.parameters.linkage.topology.cylinders), lanes] = 1.0
 
     def prepare(self, lanes: int, sampled: bool) -> None:
         if self.action.shape[1] != lanes:
@@ -289,7 +303,8 @@ class ResidualActuation(CompiledDriving):
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         super().__init__(CorrectedController(parameters, settings), None, {})
-        self.size, self.names, self.memory_names = settings.size, action_names(settings), memory_names(settings)
+        self.names, self.memory_names = action_names(settings, parameters), memory_names(settings, parameters)
+        self.size = len(self.names)
 
     @property
     def shown(self) -> Array:

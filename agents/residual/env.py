@@ -6,7 +6,7 @@ from agents.residual.corrected import ResidualActuation
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import refuse_unknown
 from birthsim_env.env import BirthSIMEnv
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.parts.scenarios import rig_of
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 
@@ -20,7 +20,7 @@ class _InnerController:
                 raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
         own = ("law", "impedance", "authority", "time_constant", "informed")
         refuse_unknown(arguments, (*own, "num_envs", "max_episode_steps", "autoreset_mode", "device"), inside)
-        rig = load_parameters(arguments.pop("parameters", None))
+        rig = rig_of(scenario, arguments.pop("parameters", None))
         shared = {name: arguments[name] for name in ("policy_period", "force_sensor") if name in arguments}
         settings = ResidualSettings(**shared, **{name: arguments.pop(name) for name in own if name in arguments})
         super().__init__(scenario, parameters=rig, actuation=ResidualActuation(rig, settings), **arguments)  # type: ignore[call-arg]

@@ -10,9 +10,10 @@ from typing import Any, TypeVar
 from agents.residual.settings import ResidualSettings
 from agents.training.algorithm import HYPERPARAMETERS, Algorithm
 from birthsim_env.assembly import one_of
+from birthsim_env.ids import rig_for
 from birthsim_env.parts.drawn.frictions import with_friction
 from birthsim_env.parts.drawn.randomization import RANDOMIZE
-from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, make_plain, near, path_of, shown, whole_of
 from birthsim_env.registry import entry, names
@@ -154,7 +155,7 @@ class TrainingSettings:
 
     def rig(self, parameters: Any = None) -> Parameters:
         """The rig that ``parameters=`` describes, about which rigs are drawn."""
-        return with_friction(load_parameters(parameters), self.friction)
+        return with_friction(rig_for(self.environment, parameters), self.friction)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON takes it."""

@@ -21,8 +21,8 @@ from baselines.driving import Driving, driving
 from baselines.named import make_controller
 from baselines.tables import aligned, markdown
 from birthsim_env.assembly import Arguments, refuse_unknown, spelled_out
+from birthsim_env.ids import rig_for
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import checked_count, shown
 from birthsim_env.simulation import Simulation
 
@@ -172,7 +172,7 @@ def evaluate(
     if name is None:
         name = controller if isinstance(controller, str) else getattr(controller, "__name__", type(controller).__name__)
     if isinstance(controller, str):
-        controller = make_controller(controller, load_parameters(arguments.get("parameters")))
+        controller = make_controller(controller, rig_for(environment, arguments.get("parameters")))
     return evaluate_worlds(environment, controller, name, range(seed, seed + episodes), None, progress, **arguments)
 
 
@@ -243,7 +243,7 @@ def _run_batch(
     spent: list[float],
     progress: bool,
 ) -> None:
-    period = load_parameters(arguments.get("parameters")).electronics.control_period
+    period = rig_for(environment, arguments.get("parameters")).electronics.control_period
     driver = driving(controller, result.controller)
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
     if rigs is not None:
@@ -267,7 +267,7 @@ def _run_batch(
     bar.close()
     spent += times_of(driver, simulation)
     env.close()
-    for name, values in metrics_of(own, period).items():
+    for name, values in metrics_of(own, period, simulation.parameters.linkage.topology).items():
         result.metrics[name] += values.tolist()
     result.seeds += seeds
     result.required_strength_ratio += asked.tolist()

@@ -8,7 +8,7 @@ it harms nothing.
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.bench.metrics import Tally, fresh_tally, sample, window
+from baselines.bench.metrics import Tally, fresh_tally, sample, turn, window
 from birthsim_env import reward
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
@@ -57,6 +57,8 @@ def _measure(world: World, seen: Seen, own: Memory, constants: Constants, tables
     now, every, reference = Info(scratch(Info.size)), int(constants.every), seen.reference
     kept, errors = table3(tables, 0)[:, :, lane : lane + n], table3(tables, 1)[:, :, lane : lane + n]
     describe(world, seen, now, n)
+    load(seen.opening, 0, n, own.command)
+    turn(now, own.command, world.rig, n)
     for i in range(n):
         number = int(own.count[i])
         if number == 0:
@@ -72,7 +74,6 @@ def _measure(world: World, seen: Seen, own: Memory, constants: Constants, tables
             for axis in range(2):
                 errors[number // every, axis, i] = now.tracking_error[axis, i]
         world.impact[0, i], world.impact[1, i] = 0.0, 0.0
-    load(seen.opening, 0, n, own.command)
     sample(now, own.command, constants.limits.period, own, kept, n)
     return 0
 

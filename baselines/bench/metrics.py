@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.info import Info
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
+from birthsim_env.physics.rig.topology import RAIL, TOPOLOGIES, TWO_CYLINDERS, Topology
 from birthsim_env.reward import SETTLED
 
 QUIET = 1.0
@@ -49,6 +51,16 @@ class Asked(Rows):
     compliant_target = rows(2, "m", "(19)")
     force = rows(2, "N", "of the hand")
     pneumatic_stiffness = rows(2, "N/m", "setpoint of the cylinders")
+
+
+VECTORS = tuple(
+    one.first
+    for one in (Info.position, Info.velocity, Info.target, Info.compliant_target, Info.tracking_error, Info.user_force)
+)
+"""Rows of an ``Info`` at which a vector of the plane begins."""
+
+NOT_OF_A_RAIL = (*(name for name in UNITS if name.endswith(("_y", "_1"))), "cross_motion")
+"""Metrics of which an episode on a rail says nothing. Those of x are along the rail there, those of valves of its own two."""
 
 
 class Tally(Rows):
@@ -165,6 +177,18 @@ def _add_rest(now: Info, period: float, tally: Tally, kept: Array, i: int) -> No
 
 
 @helper
+def turn(now: Info, command: Array, p: Array, n: int) -> None:
+    """Of lanes on a rail, turns vectors so that x is along it, and leaves out ``command`` (4, n) of idle valves."""
+    for i in range(n):
+        if p[at.FREE, i] == 0.0:
+            cosine, sine = p[at.SIN_GAMMA3, i], -p[at.COS_GAMMA3, i]  # of the inclination
+            for row in VECTORS:
+                x, y = now.rows[row, i], now.rows[row + 1, i]
+                now.rows[row, i], now.rows[row + 1, i] = cosine * x + sine * y, cosine * y - sine * x
+            command[0, i], command[1, i] = 0.0, 0.0
+
+
+@helper
 def sample(now: Info, command: Array, period: float, tally: Tally, kept: Array, n: int) -> None:
     """Take one instant of n lanes: ``now``, and ``command`` (4, N), the openings.
 
@@ -219,8 +243,9 @@ class EpisodeMetrics:
         return metrics_of(self._tally, self._period)
 
 
-def metrics_of(tally: Tally, period: float) -> dict[str, Array]:
+def metrics_of(tally: Tally, period: float, topology: Topology = TOPOLOGIES[TWO_CYLINDERS]) -> dict[str, Array]:
     """Every metric of ``UNITS`` per lane, (N,), of a tally sampled every ``period`` s."""
+    valves = 1.0 / len(topology.chambers)
     count, settled_count, quiet = tally.count, tally.settled_count, tally.quiet_time
     with np.errstate(invalid="ignore", divide="ignore"):
         rms = 1e3 * np.sqrt(tally.squares / count)
@@ -245,10 +270,13 @@ def metrics_of(tally: Tally, period: float) -> dict[str, Array]:
             "pneumatic_rms_2": pneumatic[1],
             "air": 60e3 * tally.supplied / NORMAL_DENSITY / (count * period),
             "saturation": 100 * tally.saturated / count,
-            "valve_turns": 0.25 * tally.turned / (count * period),
-            "valve_travel": 0.25 * tally.travelled / (count * period),
+            "valve_turns": valves * tally.turned / (count * period),
+            "valve_travel": valves * tally.travelled / (count * period),
         }
         values["stiffness_error"], values["cross_motion"], values["unrest"] = _rendered(tally)
+    if topology == TOPOLOGIES[RAIL]:
+        values["settled_rms"] = values["settled_rms_x"]
+        values |= {name: np.full_like(values[name], np.nan) for name in NOT_OF_A_RAIL}
     return {name: values[name] for name in UNITS}
 
 

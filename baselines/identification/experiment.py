@@ -95,6 +95,8 @@ def propose(rig: Parameters, duration: float, seed: int = 0) -> Plan:
     ramp = ramp**3 * (10 - 15 * ramp + 6 * ramp**2)
     piston = np.array([_multisine(times, 0.5 * one.stroke, rng) * ramp for one in (rig.cylinder1, rig.cylinder2)])
     added = np.array([_steps(len(times), rng) for _ in range(4)]) * (ramp >= 1.0)
+    idle = [k for k in range(4) if k not in rig.linkage.topology.chambers]
+    added[idle], piston[[k // 2 for k in idle]] = 0.0, 0.0
     return Plan(times, end_effector(piston, rig), added, _stiffness(times))
 
 

@@ -149,6 +149,8 @@ class Identified:
         """What the zeros of encoders are off, a line each."""
         lines = []
         for k, (off, deviation, before) in enumerate(zip(*self.zeros, self.known_zeros, strict=True)):
+            if k not in self.rig.linkage.topology.cylinders:
+                continue
             reach = f"{1e3 * off:.3g} +- {1e3 * NORMAL * deviation:.2g} mm"
             told = "" if deviation < DETERMINED * before else f": no more than what was known, +- {2e3 * before:.2g} mm"
             lines.append(f"the encoder of cylinder {k + 1} counts {reach} too much{told}")
@@ -170,9 +172,9 @@ class Identified:
 
     def _unlike_valves(self) -> list[str]:
         """A chamber of whose pressure the fit leaves more than of the others', in a line."""
-        left = self.left_over
+        left, chambers = self.left_over, list(self.rig.linkage.topology.chambers)
         k = int(np.argmax(left))
-        if left[k] < max(UNLIKE * float(np.median(left)), MISFIT):
+        if left[k] < max(UNLIKE * float(np.median(left[chambers])), MISFIT):
             return []
         name = CHAMBERS[k]
         return [
@@ -196,7 +198,7 @@ MISFIT = 1.1
 """Residuals so many times larger than the noise are named."""
 
 UNLIKE = 1.25
-"""A chamber is named whose residuals, over its noise, are so many times the median of all four; assumed."""
+"""A chamber is named whose residuals, over its noise, are so many times the median of all; assumed."""
 
 MOST_FORMS = 2
 """Times that forms are looked for which the log shows."""

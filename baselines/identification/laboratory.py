@@ -8,6 +8,7 @@ import numpy as np
 from baselines.bench.resting import RestingRigs
 from baselines.controller import Controller
 from baselines.identification.experiment import PNEUMATIC, Plan
+from baselines.identification.log.rail_log import on_rail
 from baselines.identification.log.trial import Trial
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.loop.stage import Part
@@ -77,4 +78,6 @@ def _run(
     loop.close([follow], [add], [*([carry(loop)] if carry else loop.pipeline.group("plant")), look])
     loop.run(count)
     counted = np.full(2, rig.electronics.encoder_offset) if sensors.startswith("encoders") else None
-    return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)), counted=counted)
+    times, forces = start + period * np.arange(count), np.zeros((2, count))
+    trial = Trial(times, openings, pressures, positions, forces, counted=counted)
+    return on_rail(trial, rig) if rig.linkage.is_rail else trial

@@ -16,9 +16,10 @@ from birthsim.command_line.worlds import check_environment, with_options
 from birthsim.recorded import driven
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.files import make_folder, whole_file
+from birthsim_env.ids import rig_for
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 SAMPLE = 0.005
 """s between the points of the error's curve."""
@@ -132,7 +133,7 @@ def main(settings: Settings) -> None:
     path, span = settings.out, (settings.begin, settings.end)
     if path.suffix not in (".webp", ".gif"):
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .webp or .gif")
-    rig = load_parameters(settings.parameters)
+    rig = rig_for(settings.env, settings.parameters)
     check_environment(settings.env)
     names, randomize = with_options(settings.controller, settings.set), RANDOMIZE[settings.randomize]
     envs = [

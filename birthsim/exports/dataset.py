@@ -22,7 +22,9 @@ from birthsim.command_line.worlds import check_environment, policy_of
 from birthsim.exports import Form
 from birthsim_env import Parameters, __version__, normalized_score, reference_scores
 from birthsim_env.files import make_folder, whole_folder, write_text
+from birthsim_env.ids import rig_for
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.topology import refuse_rail
 from birthsim_env.registry import register
 
 PERIOD = 0.005
@@ -76,6 +78,7 @@ class Recorded:
 
 def main(settings: Settings) -> None:
     """Record, and say what the dataset is worth."""
+    refuse_rail(rig_for(settings.env, None), "a dataset")
     try:
         import minari
         from minari.data_collector import EpisodeBuffer

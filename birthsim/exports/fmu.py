@@ -14,7 +14,7 @@ from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.fmu.archive import BINARIES, VERSIONS, write_fmu
 from birthsim_build.fmu.model import fmu_model
 from birthsim_build.loops import law_part, scenario_world
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.ids import rig_for
 from birthsim_env.physics.rig.reading import named
 from birthsim_env.registry import register
 
@@ -55,7 +55,7 @@ def main(settings: Settings) -> None:
     scenario_of(settings.env)
     require_llvm()
     require_linker()
-    rig = load_parameters(settings.parameters)
+    rig = rig_for(settings.env, settings.parameters)
     world = scenario_world(settings.env, settings.sensors, rig, settings.seed)
     name = RESIDUAL if settings.policy else settings.controller
     law = law_part(f"{name}:{settings.policy}" if settings.policy else name, rig, world.sampled) if name else None

@@ -23,7 +23,9 @@ from birthsim_build.code.ptx import require_assembler
 from birthsim_build.code.targets import TARGETS
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.ids import rig_for
+from birthsim_env.parts.scenarios import environment_id, scenarios_for
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names, register
 
 OLDEST = TARGETS["ptx"].processor
@@ -79,8 +81,8 @@ def main(settings: Settings) -> None:
         raise ValueError(f"--gpu with {target}; allowed: with cubin")
     if threads and settings.seed is not None:
         raise ValueError(f"--seed with {target}; allowed: with other targets, kernels are told it where they run")
-    rig = load_parameters(settings.parameters)
-    scenarios, sensors, controllers, policies = _chosen(settings)
+    rig = rig_for((settings.env or [""])[0], settings.parameters)
+    scenarios, sensors, controllers, policies = _chosen(settings, rig)
     require_llvm()
     if target == "cubin":
         require_assembler()
@@ -110,7 +112,7 @@ for _order, (_form, (_about, _besides)) in enumerate(FORMS.items(), 20):
     register(export=_form, about=_about, order=_order)(Form(Settings, main, f"{_besides}--out out/{_form}"))
 
 
-def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[str]]:
+def _chosen(settings: Settings, rig: Parameters) -> tuple[list[str], list[str], list[str], list[str]]:
     """Scenarios, sensors, controllers and policies."""
     named = [name for name in ("env", "sensors", "controller", "policy") if getattr(settings, name)]
     if settings.all and named:
@@ -120,8 +122,8 @@ def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[s
     if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        return names("scenario"), names("sensors"), compiled_names(listed=True), _shipped()
-    scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v2"]]
+        return scenarios_for(rig), names("sensors"), compiled_names(listed=True), _shipped()
+    scenarios = [scenario_of(one) for one in settings.env or [environment_id(scenarios_for(rig)[0])]]
     controllers = settings.controller or ([] if settings.policy else ["backstepping"])
     return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy
 

@@ -40,19 +40,21 @@ def _text(term: Any) -> str:
     return term.text if isinstance(term, Expression) else float(term).hex()
 
 
-def parameter_names() -> list[str]:
-    """Dotted names of the numbers that may be set, in the order of their declarations: those that the plant computes with.
+def parameter_names(rig: Parameters) -> list[str]:
+    """Dotted names of a rig's numbers that may be set, in the order of their declarations: those that its plant computes with.
 
     Options (``declaration.Parameter``) are not among them, since another plant is compiled for those.
     """
     return [
         name
         for name, one in DECLARED.items()
-        if name in plant_parameters() and not (one.choices or one.option or name.partition(".")[0] == STAYS)
+        if name in plant_parameters()
+        and rig.linkage.topology.has(name)
+        and not (one.choices or one.option or name.partition(".")[0] == STAYS)
     ]
 
 
 def derived_parameters(rig: Parameters) -> list[str]:
     """C expressions of the rows of ``physics.compiled.lanes``, over ``p[k]``, the k-th of ``parameter_names``."""
-    place = {name: Expression(f"p[{k}]") for k, name in enumerate(parameter_names())}
+    place = {name: Expression(f"p[{k}]") for k, name in enumerate(parameter_names(rig))}
     return [_text(row) for row in rows_of(Substitute(lambda name: place[name] if name in place else value_of(rig, name)))]

@@ -54,7 +54,7 @@ def fmu_model(identifier: str, about: str, world: World, law: Part | None, rig: 
     start = image.view(np.float64)[HEAD:]
     variables = (
         Variable("time", "independent", "s", "simulated time"),
-        *(_parameter(name, rig) for name in parameter_names()),
+        *(_parameter(name, rig) for name in parameter_names(rig)),
         *(_variable(row, "input", start) for row in inputs),
         *(_variable(row, "output", start) for row in outputs),
     )

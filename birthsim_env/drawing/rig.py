@@ -118,6 +118,8 @@ class Rig:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         g, cylinders = parameters.geometry, (parameters.cylinder1, parameters.cylinder2)
+        # The first cylinder that there is: a rail has the second alone.
+        self._first = parameters.linkage.topology.cylinders[0]
         self._half1, self._half2 = cylinders[0].stroke / 2, cylinders[1].stroke / 2
         shortest = g.k1 - self._half1, g.k2 - self._half2
         self._reach = g.k2 + self._half2
@@ -153,7 +155,8 @@ class Rig:
 
     def _poses(self, count: int) -> list[Pose]:
         """Poses over the whole stroke of cylinder 1, cylinder 2 at mid stroke."""
-        poses = [self.pose((float(y1), 0.0)) for y1 in np.linspace(-self._half1, self._half1, count)]
+        travel = 0.0 if self._first else self._half1
+        poses = [self.pose((float(y1), 0.0)) for y1 in np.linspace(-travel, travel, count)]
         return [pose for pose in poses if pose is not None]
 
     def extent(self) -> tuple[Point, Point]:
@@ -164,7 +167,7 @@ class Rig:
         for pose in self._poses(9):
             for x, y in (pose.axis2.at(k2 - self._half2), pose.axis2.at(k2 + self._half2)):
                 points += [(x - around, y - around), (x + around, y + around)]
-            for barrel, axis in ((first, pose.axis1), (second, pose.axis2)):
+            for barrel, axis in ((first, pose.axis1), (second, pose.axis2))[self._first :]:
                 points += [axis.at(min(barrel.rear, -wide), side) for side in (-wide, wide)]
         xs, ys = zip(*points, strict=True)
         return (min(xs), min(ys)), (max(xs), max(ys))
@@ -179,21 +182,24 @@ class Rig:
         g = self.parameters.geometry
         pen.polygon(self.workspace(), (241, 244, 240), (214, 221, 212))
         column, half = Axis((0.0, 0.0), (math.cos(g.gamma3), math.sin(g.gamma3))), 0.8 * self.barrels[1].half_bore
-        pen.polygon(column.box(-2 * half, g.d3 + 2 * half, half), FAINT, (200, 205, 211))
+        if not self._first:
+            pen.polygon(column.box(-2 * half, g.d3 + 2 * half, half), FAINT, (200, 205, 211))
 
     def draw(self, pen: Pen, pose: Pose, colours: Sequence[Colour]) -> None:
         """Everything that moves; ``colours`` of the chambers P1, N1, P2, N2."""
         first, second = self.barrels
-        for barrel, axis, pins in ((first, pose.axis1, (0.0,)), (second, pose.axis2, (0.0, self.parameters.geometry.d6))):
+        pins2 = (0.0,) if self._first else (0.0, self.parameters.geometry.d6)
+        for barrel, axis, pins in ((first, pose.axis1, (0.0,)), (second, pose.axis2, pins2))[self._first :]:
             for at in pins:
                 # Where a pin lies beyond the barrel, a lug on the barrel carries it.
                 if at < barrel.rear or at > barrel.front:
                     ends = (at, barrel.rear) if at < barrel.rear else (barrel.front, at)
                     pen.polygon(axis.box(*ends, 0.6 * barrel.half_bore), CAP, INK)
         second.draw(pen, pose.axis2, pose.piston[1], (colours[2], colours[3]))
-        first.draw(pen, pose.axis1, pose.piston[0], (colours[0], colours[1]))
+        if not self._first:
+            first.draw(pen, pose.axis1, pose.piston[0], (colours[0], colours[1]))
         pin = 0.45 * pen.scale * second.half_bore
-        for place in (pose.axis1.origin, pose.axis2.origin, pose.joint):
+        for place in (pose.axis2.origin, *(() if self._first else (pose.axis1.origin, pose.joint))):
             pen.disc(place, 1.6 * pin, CAP, INK)
             pen.disc(place, 0.8 * pin, STEEL, INK)
         head(pen, Axis(pose.end_effector, pose.axis2.along), self.head_radius)
@@ -201,6 +207,8 @@ class Rig:
     def chamber_names(self, pose: Pose, away: float) -> Iterator[tuple[str, Point]]:
         """P1, N1, P2, N2 and their places, m: ``away`` m beside the barrels, on the sides that face away from each other."""
         for i, (barrel, axis, side) in enumerate(zip(self.barrels, (pose.axis1, pose.axis2), (1, -1), strict=True)):
+            if i < self._first:
+                continue
             aside = side * (1.25 * barrel.half_bore + away)
             yield f"P{i + 1}", axis.at(barrel.rear + 2.2 * barrel.cap, aside)
             yield f"N{i + 1}", axis.at(barrel.front - 2.2 * barrel.cap, aside)

@@ -8,7 +8,21 @@ from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, scratch, table2
 from birthsim_env.physics import dynamics, options
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import INVERSE_SUPPLY, SOURCE, STATES, SUPPLY, V1, V2, Y1, Y2, Array, Rig
+from birthsim_env.physics.compiled.lanes import (
+    COS_GAMMA3,
+    FREE,
+    INVERSE_SUPPLY,
+    SIN_GAMMA3,
+    SOURCE,
+    STATES,
+    SUPPLY,
+    V1,
+    V2,
+    Y1,
+    Y2,
+    Array,
+    Rig,
+)
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.equilibrium import balance
 from birthsim_env.physics.linkage.geometry import end_effector_motion
@@ -130,8 +144,8 @@ def _start(world: World, seen: Seen, own: Start, constants: NominalRig, tables: 
             motion.velocity[axis, i] = 0.0 if at_place else asked.velocity[axis, i]
     piston_motion(motion.rows, constants.rig, joints.rows, n)
     for i in range(n):
-        x[Y1, i], x[Y2, i] = joints.position[0, i], joints.position[1, i]
-        x[V1, i], x[V2, i] = joints.velocity[0, i], joints.velocity[1, i]
+        x[Y1, i], x[Y2, i] = p[FREE, i] * joints.position[0, i], joints.position[1, i]
+        x[V1, i], x[V2, i] = p[FREE, i] * joints.velocity[0, i], joints.velocity[1, i]
     balance(x[:, :n], asked.pneumatic_stiffness, p)
     for k in range(STATES):
         for i in range(n):
@@ -231,6 +245,21 @@ def jump_stage(period: float, jump_rate: float, memory: Array, begins: bool) -> 
     ``memory`` (5, N) is ``PreviousSetpoints``; where an episode ``begins`` it is only written.
     """
     return Stage(_jumps, _jump_detection(period, jump_rate, begins), memory)
+
+
+@kernel
+def _guide(world: World, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Leaves of the hand's force what acts along the rail, whose guide bears the rest."""
+    for i in range(n):
+        cosine, sine = world.rig[SIN_GAMMA3, i], -world.rig[COS_GAMMA3, i]  # of the inclination
+        along = cosine * world.force[0, i] + sine * world.force[1, i]
+        world.force[0, i], world.force[1, i] = along * cosine, along * sine
+    return 0
+
+
+def guide_stage() -> Stage:
+    """What a rail bears of the hand's force, so that no one further on has to know of it."""
+    return Stage(_guide)
 
 
 @kernel

@@ -21,6 +21,7 @@ from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.pneumatics import tubes, valves
 from birthsim_env.physics.pneumatics.air import driving_flows, valve_of
+from birthsim_env.physics.rig.topology import TOPOLOGIES, TWO_CYLINDERS, Topology
 
 VALVE_LAYOUTS = ("two_valves", "one_valve")
 CHAMBERS = ("P1", "N1", "P2", "N2")
@@ -93,24 +94,27 @@ class Layout(Numbers):
     """Constants of a stage."""
 
     one_valve = number("1", "1 with one valve per cylinder")
+    first = number("1", "the first chamber whose valve is driven")
 
 
 @kernel
 def _valve_stage(world: int, seen: Seen, memory: int, layout: Layout, tables: int, lane: int, n: int) -> int:
-    one_valve = layout.one_valve > 0.0
+    one_valve, first = layout.one_valve > 0.0, int(layout.first)
     for i in range(n):
-        for valve in range(4):
-            opened = seen.action[valve, i] if not one_valve else (1 - 2 * (valve % 2)) * seen.action[valve // 2, i]
+        for valve in range(first, 4):
+            own = valve - first
+            opened = seen.action[own, i] if not one_valve else (1 - 2 * (own % 2)) * seen.action[own // 2, i]
             seen.opening[valve, i] = opened
     return 0
 
 
 @kernel
 def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: int, lane: int, n: int) -> int:
+    first = int(layout.first)
     wanted, one_valve, state, p, openings = seen.action, layout.one_valve > 0.0, world.state, world.rig, seen.opening
     for i in range(n):
         full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * p[at.RHO0, i] * math.sqrt(p[at.COLDNESS, i])
-        for cylinder in range(2):
+        for cylinder in range(first // 2, 2):
             pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
             chamber_p, chamber_n = (0, 1) if cylinder == 0 else (2, 3)
             end_p, coldness_p = tubes.at_valve(p, i, world.at_valve[chamber_p, i], state[pp, i], state[tp, i])
@@ -121,7 +125,7 @@ def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: i
                 half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
                 y = max(-0.95 * half, min(0.95 * half, state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]))
                 opened = valves.opening_for_active_flow(
-                    full * wanted[cylinder, i],
+                    full * wanted[cylinder - first // 2, i],
                     fill_p,
                     drain_p,
                     fill_n,
@@ -133,7 +137,7 @@ def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: i
                 )
                 openings[chamber_p, i], openings[chamber_n, i] = opened, -opened
             else:
-                flow_p, flow_n = full * wanted[chamber_p, i], full * wanted[chamber_n, i]
+                flow_p, flow_n = full * wanted[chamber_p - first, i], full * wanted[chamber_n - first, i]
                 openings[chamber_p, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, valve_of(p, i, chamber_p))
                 openings[chamber_n, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, valve_of(p, i, chamber_n))
     return 0
@@ -147,9 +151,9 @@ class _ByLayout(Actuation):
     """And whether it has to see the world."""
     entries: ClassVar[tuple[tuple[str, ...], tuple[str, ...]]]
 
-    def __init__(self, layout: str) -> None:
-        self._one_valve = layout == "one_valve"
-        self.names = self.entries[self._one_valve]
+    def __init__(self, layout: str, topology: Topology = TOPOLOGIES[TWO_CYLINDERS]) -> None:
+        self._one_valve, self._first = layout == "one_valve", topology.chambers[0]
+        self.names = self.entries[self._one_valve][topology.cylinders[0] if self._one_valve else self._first :]
         self.size = len(self.names)
         self._action: Array = np.zeros((self.size, 0))
 
@@ -167,7 +171,7 @@ class _ByLayout(Actuation):
 
     def _stage(self) -> Stage:
         function, sees_world = self.kernel
-        return Stage(function, Layout.numbers(one_valve=self._one_valve), sees_world=sees_world)
+        return Stage(function, Layout.numbers(one_valve=self._one_valve, first=self._first), sees_world=sees_world)
 
     def stages(self, lanes: int, sampled: bool, foreign: bool) -> list[Stage]:
         """``openings``, compiled into the closed loop."""
@@ -199,4 +203,4 @@ class FlowActuation(_ByLayout):
     )
 
 
-ACTUATIONS: dict[str, Callable[[str], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}
+ACTUATIONS: dict[str, Callable[[str, Topology], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}

@@ -162,6 +162,71 @@ class Circle(_Planned):
         put(self._own, lane, (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng)))
 
 
+class Swing(Rows):
+    """To and fro along a line."""
+
+    middle = rows("x y", "m", "middle")
+    direction = rows("x y", "1", "of the line")
+    amplitude = row("m", "amplitude")
+    rate = row("rad/s", "angular frequency")
+
+
+@kernel
+def _sine(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    own, time, target = Swing(table2(tables, 0)[:, lane : lane + n]), seen.time, seen.reference
+    for i in range(n):
+        w = own.rate[i]
+        cosine, sine = own.amplitude[i] * exact.cosine(w * time[i]), own.amplitude[i] * exact.sine(w * time[i])
+        for axis in range(2):
+            way = own.direction[axis, i]
+            target.position[axis, i] = own.middle[axis, i] + way * sine
+            target.velocity[axis, i] = w * way * cosine
+            target.acceleration[axis, i] = -w * w * way * sine
+            target.jerk[axis, i] = -w * w * w * way * cosine
+    return 0
+
+
+class Sine(_Planned):
+    """To and fro along a line, a sine of time, from its middle on.
+
+    Parameters
+    ----------
+    middle : (float, float)
+        x and y, m.
+    heading : float
+        Of the line, rad from x.
+    amplitude : float or (float, float)
+        m; a range (low, high) is drawn from at the start of every episode.
+    period : float or (float, float)
+        s to and fro.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    """
+
+    planned = Swing, _sine
+
+    def __init__(
+        self, middle: tuple[float, float] = (0.5, 0.0), heading: float = 0.0, amplitude: Range = 0.05, period: Range = 4.0
+    ) -> None:
+        if not (isinstance(middle, tuple) and len(middle) == 2):
+            raise ValueError(f"middle = {shown(middle)}; allowed: (x, y) (m)")
+        for coordinate in middle:
+            checked_number("middle", coordinate, "m", least=-FARTHEST, most=FARTHEST)
+        checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
+        checked_range("amplitude", amplitude, "m", least=0.0, most=FARTHEST)
+        checked_range("period", period, "s", least=SHORTEST, most=LONGEST)
+        self.middle, self.amplitude, self.period = middle, amplitude, period
+        self._direction = exact.direction(heading)
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        rate = 2 * math.pi / draw(self.period, rng)
+        put(self._own, lane, (*self.middle, *self._direction, draw(self.amplitude, rng), rate))
+
+
 @helper
 def minimum_jerk(u: float, order: int) -> float:
     """10 u^3 - 15 u^4 + 6 u^5 on [0, 1] (Flash and Hogan 1985), or its first to third derivative; constant outside."""

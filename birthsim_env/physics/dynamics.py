@@ -95,12 +95,12 @@ def rates_under(
         + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
     )
     dx[at.Y1] = v1
-    dx[at.V1] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
+    dx[at.V1] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS1, i], p[at.GRAVITY1, i])
     dx[at.Y2] = v2
     dx[at.V2] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
     air.air_rates(x, p, dx, i, together)
-    dx[at.S1P] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
-    dx[at.S1N] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]
+    dx[at.S1P] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE1, i]
+    dx[at.S1N] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE1, i]
     dx[at.S2P] = (u[2, i] - x[at.S2P, i]) * p[at.SPOOL_RATE, i]
     dx[at.S2N] = (u[3, i] - x[at.S2N, i]) * p[at.SPOOL_RATE, i]
 

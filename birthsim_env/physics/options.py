@@ -61,8 +61,8 @@ def alter(p: Array, own: Array, tube: Array, n: int) -> None:
     for i in range(n):
         rest = 1.0 - p[at.HANDLE, i]
         bends = p[at.MODE_RATE, i] > 0.0
-        own[at.INVERSE_MASS, i] = p[at.INVERSE_MASS, i] / rest if bends else p[at.INVERSE_MASS, i]
-        own[at.GRAVITY, i] = p[at.GRAVITY, i] / rest if bends else p[at.GRAVITY, i]
+        for row in (at.INVERSE_MASS, at.INVERSE_MASS1, at.GRAVITY, at.GRAVITY1):
+            own[row, i] = p[row, i] / rest if bends else p[row, i]
 
 
 @helper

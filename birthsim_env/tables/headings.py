@@ -4,7 +4,9 @@ import re
 
 from birthsim_env.tables.units import unit_of
 
-_CHAMBERS = ("P1", "N1", "P2", "N2")
+_CHAMBERS = ("P1", "N1", "P2", "N2", "P", "N")
+"""The last two are those of a rig with one cylinder."""
+
 _OPENINGS = ("openings", "opening", "valve", "valves", "valve_opening", "valve_openings")
 _PRESSURES = ("pressures", "pressure", "p", "chamber_pressure")
 
@@ -13,6 +15,9 @@ CONCEPTS: dict[str, tuple[str, tuple[str, ...]]] = {
     **{f"position_{a}": ("m", (a, f"pos_{a}", f"{a}_position", f"{a}_pos")) for a in "xy"},
     **{f"force_{a}": ("N", (f"F{a}", f"{a}_force", f"hand_force_{a}", f"user_force_{a}")) for a in "xy"},
     "stiffness": ("N/m", ()),
+    "position": ("m", ("pos",)),
+    "force": ("N", ()),
+    "opening": ("1", ()),
     **{
         f"{words[0]}_{chamber}": (unit, tuple(name for word in words for name in (f"{word}_{chamber}", f"{chamber}_{word}")))
         for words, unit in ((_OPENINGS, "1"), (_PRESSURES, "Pa"))

@@ -11,6 +11,7 @@ from typing import Any
 
 from birthsim_build.layout import DRAG_LIMIT
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
+from birthsim_env.parts.scenarios import scenarios_for
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
 from birthsim_live.rig.words import CHOICES, described, words
@@ -66,7 +67,7 @@ def default_settings(rig: Parameters) -> dict[str, Any]:
 def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str, Any]:
     """It, with the choices of ``controllers``."""
     g, air = rig.geometry, rig.air
-    named = {"scenario": names("scenario"), "valves": VALVE_LAYOUTS, "sensors": names("sensors")}
+    named = {"scenario": scenarios_for(rig), "valves": VALVE_LAYOUTS, "sensors": names("sensors")}
     return {
         "choices": {
             "controller": controllers,

@@ -23,7 +23,7 @@ from birthsim_env.loop.stage import Stage, stage_of
 from birthsim_env.loop.world import FurtherStates, Start, plant_stage, start_stages
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import Parts, find_scenario
+from birthsim_env.parts.scenarios import Parts, find_scenario, scenarios_for
 from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array, parameter_column
@@ -82,7 +82,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     start, rest = start_stages(np.zeros((Start.size, 1)), column[:, 0], plant(tubes))
     laws = {name: law for name in chosen if is_compiled(law := _made(name, rig))}
     made: dict[str, dict[str, Any]] = {
-        "scenarios": {name: scenario(name) for name in names("scenario")},
+        "scenarios": {name: scenario(name) for name in scenarios_for(rig)},
         "sensors": {name: sensors(name, rig) for name in names("sensors")},
         "controllers": {name: controller_parts(law) for name, law in laws.items()},
     }

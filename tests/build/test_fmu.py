@@ -175,7 +175,7 @@ def test_parameters_act_as_in_python(written, unit):
 
 
 def test_the_c_code_derives_parameters_as_python_does(tmp_path):
-    names = parameter_names()
+    names = parameter_names(Parameters())
     rng = np.random.default_rng(0)
     rows = "\n".join(f"r[{k}] = {term};" for k, term in enumerate(derived_parameters(RIG)))
     (tmp_path / "derive.c").write_text(f"""#include <math.h>\n#include <stdio.h>

@@ -85,11 +85,14 @@ def case(changes: dict[str, Any], seed: int) -> Case:
     states[list(at.TEMPERATURES)] += rng.uniform(-9.0, 9.0, (4, SITUATIONS))
     states[list(at.SPOOLS)] = rng.uniform(-0.9, 0.9, (4, SITUATIONS))
     command, force = rng.uniform(-1.0, 1.0, (4, SITUATIONS)), rng.uniform(-40.0, 40.0, (2, SITUATIONS))
-    return Case(rig, {name: another(rig, name) for name in NAMES}, states, command, force)
+    given = rig.linkage.locked_geometry(1.0, 1.0) if rig.linkage.is_rail else {}
+    names = [name for name in NAMES if name.removeprefix("geometry.") not in given]
+    return Case(rig, {name: another(rig, name) for name in names}, states, command, force)
 
 
 CASES = [case({"friction.law": law}, seed) for seed, law in enumerate(DECLARED["friction.law"].choices)]
 CASES.append(case(EVERYTHING, len(CASES)))
+CASES.append(case({"linkage.kind": "rail"}, len(CASES)))
 
 
 def in_the_kernel(case: Case) -> set[str]:

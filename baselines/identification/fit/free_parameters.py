@@ -53,13 +53,19 @@ def free_of(owner: Parameters, latency: str = TRACKER) -> tuple[FreeParameter, .
     late = DECLARED[latency].identified
     assert late, "latencies are declared to be identified"
     usual = (one for one in FREE_PARAMETERS if one.name != TRACKER)
-    return _in_order((*usual, *asked, FreeParameter(latency, late)))
+    every = (*usual, *asked, FreeParameter(latency, late))
+    return _in_order(one for one in every if owner.linkage.topology.has(one.name))
 
 
 def shown_by(owner: Parameters) -> tuple[FreeParameter, ...]:
     """What a log may show though the owner's rig lacks it."""
     return tuple(
-        one for one in FURTHER_PARAMETERS if one.prior.scale and _needed(one) == one.name and _is_default(owner, one.name)
+        one
+        for one in FURTHER_PARAMETERS
+        if one.prior.scale
+        and _needed(one) == one.name
+        and _is_default(owner, one.name)
+        and owner.linkage.topology.has(one.name)
     )
 
 
@@ -129,7 +135,7 @@ def _possible(rig: Parameters, changes: dict[str, float]) -> dict[str, float]:
     volume, mass = "chambers.dead_volume", "mechanics.mass"
     large = rig.replace(changes | {volume: 1e3, mass: 1e9})
     tube = large.chambers.whole_dead_volume - large.chambers.dead_volume
-    viscous = max(large.cylinder1.viscous_friction, large.cylinder2.viscous_friction)
+    viscous = max(getattr(large, name).viscous_friction for name in rig.linkage.topology.cylinder_names)
     least = {
         volume: settling_volume(large) / STEP.fastest_air - tube,
         mass: (viscous + large.friction.bristle_damping) / STEP.fastest_rate,

@@ -1,7 +1,7 @@
 """Which columns of a laboratory's log are which: by name, by unit, or as the user maps them; nothing is left out silently."""
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import in_line
 from birthsim_env.tables.headings import is_like_force
 from birthsim_env.tables.selection import NOTHING, Selection, clock_note, mapping_of
-from birthsim_env.tables.table import Reading
+from birthsim_env.tables.table import Reading, Table
 
 CHAMBERS = ("P1", "N1", "P2", "N2")
 OPENINGS = tuple(f"openings_{chamber}" for chamber in CHAMBERS)
@@ -70,9 +70,7 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
     for name, column in mapping.items():
         if column == NOTHING and name not in FORCES:
             raise ValueError(f"--columns {name}={NOTHING}; allowed: a column, and {NOTHING} for {', '.join(FORCES)} only")
-    table = read_table(path, Reading(options.skip, options.decimal_comma, frozenset(mapping.values()), has_options=True))
-    if not table.headed:
-        raise ValueError(f"{table.source} has no heading; allowed: a line that names {', '.join(NEEDED)}, then numbers")
+    table = headed_table(path, options, mapping, NEEDED)
     pairs = {name: [f"{name}_{axis}" for axis in "xy"] for name in RECORDED}
     recorded = {column: "N" for pair in pairs.values() for column in pair if set(pair) <= set(table.columns)}
     units = UNITS
@@ -88,11 +86,7 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
     needed = [name for name in units if name not in FORCES]
     chosen.check(needed)
     found = {name: chosen.values(name) for name in needed}
-    if not table.units.get(chosen.used["time"]) and _counts_rows(found["time"]):
-        raise ValueError(
-            f"{table.source} has a row every 1 s; allowed: a row every 0.25 to 10 ms, as often as the valves are commanded; it "
-            "looks like ms, allowed: s, or time (ms) as the heading; or like row numbers, which are no times"
-        )
+    check_counts(chosen, found["time"])
     forces, note = _forces(chosen, mapping, recorded)
     for words in (*table.notes, chosen.note(), clock_note(chosen), note):
         if words:
@@ -100,8 +94,22 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
     return table.source, found | dict(zip(FORCES, forces, strict=True))
 
 
-def _counts_rows(times: Array) -> bool:
-    return len(times) > 1 and times[0] in (0, 1) and bool((np.diff(times) == 1).all())
+def headed_table(path: Path, options: LogOptions, mapping: Mapping[str, str], needed: Iterable[str]) -> Table:
+    """The table of a log; ``ValueError`` for one without a heading."""
+    table = read_table(path, Reading(options.skip, options.decimal_comma, frozenset(mapping.values()), has_options=True))
+    if not table.headed:
+        raise ValueError(f"{table.source} has no heading; allowed: a line that names {', '.join(needed)}, then numbers")
+    return table
+
+
+def check_counts(chosen: Selection, times: Array) -> None:
+    """``ValueError`` for times that are row numbers."""
+    counts = len(times) > 1 and times[0] in (0, 1) and bool((np.diff(times) == 1).all())
+    if not chosen.table.units.get(chosen.used["time"]) and counts:
+        raise ValueError(
+            f"{chosen.table.source} has a row every 1 s; allowed: a row every 0.25 to 10 ms, as often as the valves are "
+            "commanded; it looks like ms, allowed: s, or time (ms) as the heading; or like row numbers, which are no times"
+        )
 
 
 def _forces(chosen: Selection, mapping: dict[str, str], recorded: Iterable[str]) -> tuple[Array, str]:

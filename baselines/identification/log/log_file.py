@@ -15,6 +15,7 @@ from baselines.identification.log.log_columns import (
     LogOptions,
     read_columns,
 )
+from baselines.identification.log.rail_log import RAIL_COLUMNS, rail_rows, read_rail
 from baselines.identification.log.rows import checked_trial
 from baselines.identification.log.trial import Trial
 from baselines.identification.windows.encoders import zeros_by_tracker
@@ -28,6 +29,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 def read_trial(path: Path, rig: Parameters, options: LogOptions = LogOptions()) -> Trial:  # noqa: B008  frozen
     """The trial that a log holds; ``rig`` gives the workspace and the atmosphere. ``ValueError`` in one line for a bad log."""
+    if rig.linkage.is_rail:
+        source, found = read_rail(path, options, rig)
+        return checked_trial(source, found, rig)
     source, rows = read_columns(path, options)
     groups = (OPENINGS, PRESSURES, FORCES)
     openings, pressures, forces = (np.array([rows[name] for name in group]) for group in groups)
@@ -58,9 +62,12 @@ def _ends(source: str, pistons: Array, rig: Parameters) -> Array:
 def write_trial(trial: Trial, path: Path, rig: Parameters) -> None:
     """Write a trial of a simulated ``rig`` to a file .csv, .parquet or .mcap."""
     columns, places = COLUMNS, trial.positions
-    if trial.counted is not None:
+    if rig.linkage.is_rail:
+        columns, rows = RAIL_COLUMNS, rail_rows(trial, rig)
+    elif trial.counted is not None:
         columns, places = COUNTED_COLUMNS, inverse_geometry(np.ascontiguousarray(places), rig)
-    rows = np.vstack([trial.times, trial.openings, trial.pressures, places, trial.forces])
+    if not rig.linkage.is_rail:
+        rows = np.vstack([trial.times, trial.openings, trial.pressures, places, trial.forces])
     suffix = path.suffix.lower()
     if suffix == ".csv":
         lines = [",".join(columns), *(",".join(f"{value:.10g}" for value in row) for row in rows.T)]

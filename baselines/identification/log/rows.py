@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.identification.log.faults import STILL as STANDING
 from baselines.identification.log.faults import clipped, held, jumps, pinned, samples_of, spikes, standing, strayed
-from baselines.identification.log.log_columns import OPENINGS, POSITIONS, PRESSURES
+from baselines.identification.log.log_columns import OPENINGS, PRESSURES
 from baselines.identification.log.signals import Signal
 from baselines.identification.log.timing import Grid, even_grid
 from baselines.identification.log.trial import Trial, bridged, fresh_rows, long_runs, numbers, runs
@@ -22,11 +22,13 @@ from baselines.identification.log.units import (
     check_positions,
     check_pressures,
     inside,
+    moved_along,
 )
 from baselines.identification.windows.noise import noise_of
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linkage.geometry import workspace
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.topology import Topology
 
 FEWEST = 50
 """Samples of the tracker that tell anything of motion."""
@@ -80,15 +82,18 @@ def _checked(grid: Grid, raw: Trial, rig: Parameters) -> Trial:
     openings, pressures, positions, forces = map(grid.spread, (raw.openings, raw.pressures, raw.positions, raw.forces))
     grid = _without_repeats(grid, openings, pressures, positions)
     check_openings(source, openings)
-    valves = [Signal(name, openings[k : k + 1], "", grid) for k, name in enumerate(OPENINGS)]
+    chambers = raw.topology.chambers
+    moving, named = list(chambers), [raw.topology.name_of(name) for name in (*OPENINGS, *PRESSURES)]
+    valves = [Signal(named[k], openings[k : k + 1], "", grid) for k in chambers]
     for valve in valves:
         valve.take(np.abs(valve.whole[0]) > 1 + OVER, "is no opening", "-1 to 1")
-    cells = _cells(grid, pressures, rig)
+    cells = _cells(grid, pressures, raw.topology, rig)
     tracker = _tracker(grid, positions, bridged(pressures), rig)
     sensor = _sensor(grid, forces, rig)
-    check_moving(source, OPENINGS, openings, "valves that move, as in birthsim identify --propose")
-    check_moving(source, PRESSURES, pressures, "measured pressures")
-    check_exchanged(source, bridged(openings), bridged(pressures), grid.period)
+    driven = [named[k] for k in chambers], openings[moving]
+    check_moving(source, *driven, "valves that move, as in birthsim identify --propose")
+    check_moving(source, [named[4 + k] for k in chambers], pressures[moving], "measured pressures")
+    check_exchanged(source, raw.topology, bridged(openings), bridged(pressures), grid.period)
     lacking = ~numbers(np.concatenate([openings, forces]))
     notes = [*grid.notes, *(note for signal in (*valves, *cells, tracker, sensor) for note in signal.notes())]
     driving, hand = np.clip(bridged(openings), -1, 1), bridged(forces)
@@ -96,7 +101,7 @@ def _checked(grid: Grid, raw: Trial, rig: Parameters) -> Trial:
     if np.ptp(hand, axis=1).max() == 0 and np.any(hand):
         notes.append(f"the force is ({hand[0, 0]:g}, {hand[1, 0]:g}) N in every row, as of a sensor that hangs")
     unknown = long_runs(lacking, int(BRIDGED / grid.period) + 2)
-    return Trial(grid.times, driving, pressures, positions, hand, unknown, (*raw.notes, *notes), raw.counted)
+    return Trial(grid.times, driving, pressures, positions, hand, unknown, (*raw.notes, *notes), raw.counted, raw.topology)
 
 
 def _without_repeats(grid: Grid, *signals: Array) -> Grid:
@@ -116,12 +121,12 @@ def _without_repeats(grid: Grid, *signals: Array) -> Grid:
     return replace(grid, rows=grid.rows[kept], place=grid.place[kept], notes=(*grid.notes, words))
 
 
-def _cells(grid: Grid, pressures: Array, rig: Parameters) -> list[Signal]:
-    """The four cells, whose wrong rows of ``pressures`` (4, T) become NaN."""
+def _cells(grid: Grid, pressures: Array, topology: Topology, rig: Parameters) -> list[Signal]:
+    """The cells, whose wrong rows of ``pressures`` (4, T) become NaN."""
     low, high = BELOW * rig.air.atmospheric_pressure, ABOVE * rig.air.supply_pressure
     step, gauge = QUICKEST * grid.period, f"absolute pressures of {low:g} Pa or more"
     supplied = f"at most {ABOVE:g} times the rig's air.supply_pressure of {rig.air.supply_pressure:g} Pa (--parameters)"
-    cells = [Signal(name, pressures[k : k + 1], "Pa", grid) for k, name in enumerate(PRESSURES)]
+    cells = [Signal(topology.name_of(PRESSURES[k]), pressures[k : k + 1], "Pa", grid) for k in topology.chambers]
     for cell in cells:
         check_pressures(grid.source, cell.name, cell.values[0], rig.air.atmospheric_pressure)
         for sign, limit, cause, allowed in (
@@ -136,7 +141,7 @@ def _cells(grid: Grid, pressures: Array, rig: Parameters) -> list[Signal]:
         cell.take(spikes(cell.whole[0], step), "jumps and returns", "pressures that air can follow")
         cell.take(clipped(cell.whole[0], CLIPPED), "stays at the end of its range", "a cell that is not saturated")
     whole, rows = bridged(pressures), int(STANDING / grid.period)
-    for k, cell in enumerate(cells):
+    for k, cell in zip(topology.chambers, cells, strict=True):
         cell.take(standing(whole[k], whole[k ^ 1], rows, CHANGED), "stands still", "a cell that measures")
     return cells
 
@@ -152,7 +157,7 @@ def _tracker(grid: Grid, positions: Array, pressures: Array, rig: Parameters) ->
         tracker.refuse(f"position = ({x:.6g}, {y:.6g}) m is unreachable, {grid.where(first, first + 1)}; allowed: {allowed}")
     tracker.take(outside, "is outside of the workspace", allowed)
     _check_samples(grid.source, positions)
-    check_moving(grid.source, POSITIONS, positions, "a log of a rig that moves")
+    check_moving(grid.source, *moved_along(positions, rig), "a log of a rig that moves")
     noise = noise_of(positions[:, fresh_rows(positions)])
     cut_off = jumps(positions, grid.period, noise)
     tracker.take(cut_off, "is cut off from the other rows by a jump", "positions that a motion leads to")

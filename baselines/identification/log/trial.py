@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.topology import TOPOLOGIES, TWO_CYLINDERS, Topology
 
 TRACKER, ENCODERS = "electronics.position_latency", "electronics.encoder_latency"
 """How late a position is, of a tracker and of encoders."""
@@ -21,6 +22,8 @@ class Trial:
     numbers; where the log lacks them for so long that they cannot be bridged, ``unknown`` (T,) is True. ``notes`` say in a
     line each what of the log was left out. Where encoders have counted the positions, ``counted`` (2,) is how well their zeros
     are known before, m, and positions are those at which the linkage ends.
+
+    A rail, whose ``topology`` says so, has no openings and no pressures of cylinder 1: 0 and NaN.
     """
 
     times: Array
@@ -31,6 +34,12 @@ class Trial:
     unknown: NDArray[np.bool_] | None = None
     notes: tuple[str, ...] = ()
     counted: Array | None = None
+    topology: Topology = TOPOLOGIES[TWO_CYLINDERS]
+
+    @property
+    def axes(self) -> int:
+        """Along how many axes positions have noise."""
+        return len(self.topology.cylinders)
 
     @property
     def latency(self) -> str:

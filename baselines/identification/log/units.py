@@ -3,16 +3,19 @@
 Each check guesses from what most rows hold, so that a few odd ones neither hide nor feign a wrong unit.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.signal import lfilter
 
 from baselines.identification.log.faults import Mask
-from baselines.identification.log.log_columns import CHAMBERS
+from baselines.identification.log.log_columns import CHAMBERS, POSITIONS
 from baselines.identification.log.timing import MOST
 from baselines.identification.log.trial import runs
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.linkage.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.topology import Topology
 
 OUTSIDE = 0.005
 """m that a noisy position may lie outside of the workspace."""
@@ -86,22 +89,31 @@ def inside(positions: Array, rig: Parameters) -> Mask:
     return np.asarray(near & (np.abs(joints[0]) <= first) & (np.abs(joints[1]) <= second) & (joints[2] < 0))
 
 
-def check_moving(source: str, names: tuple[str, ...], values: Array, allowed: str) -> None:
+def moved_along(positions: Array, rig: Parameters) -> tuple[tuple[str, ...], Array]:
+    """Names and values of the axes (2, T) along which a rig moves; of a rail the one along it, (1, T)."""
+    if not rig.linkage.is_rail:
+        return POSITIONS, positions
+    return ("position",), np.hypot(*positions)[None]
+
+
+def check_moving(source: str, names: Sequence[str], values: Array, allowed: str) -> None:
     """Refuse signals (C, T), NaN where they are left out, that show one value only."""
     still = [name for name, row in zip(names, values, strict=True) if not np.nanmin(row) < np.nanmax(row)]
     if still:
         raise ValueError(f"{source}: {', '.join(still)} never changes; allowed: {allowed}")
 
 
-def check_exchanged(source: str, openings: Array, pressures: Array, period: float) -> None:
+def check_exchanged(source: str, topology: Topology, openings: Array, pressures: Array, period: float) -> None:
     """Refuse pressures (4, T) that follow the valve of another chamber, or their own the wrong way round."""
     found = _correlations(openings, pressures, period)
-    for k, row in enumerate(found):
+    names = [topology.name_of(chamber) for chamber in CHAMBERS]
+    for k in topology.chambers:
+        row = found[k]
         other, words = int(np.argmax(row)), ""
         if np.argmax(np.abs(row)) == k and row[k] < -FOLLOWS:
-            words = f"pressures_{CHAMBERS[k]} falls where openings_{CHAMBERS[k]} is above 0"
+            words = f"pressures_{names[k]} falls where openings_{names[k]} is above 0"
         elif row[other] > FOLLOWS and row[k] < LOOSE:
-            words = f"pressures_{CHAMBERS[k]} follows openings_{CHAMBERS[other]}; columns look exchanged"
+            words = f"pressures_{names[k]} follows openings_{names[other]}; columns look exchanged"
         if words:
             allowed = "an opening above 0 fills the chamber of its own column, below 0 empties it"
             raise ValueError(f"{source}: {words}; allowed: {allowed}")

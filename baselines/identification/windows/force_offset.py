@@ -18,7 +18,10 @@ SURE, LEAST = 4.0, 1.0
 
 @dataclass(frozen=True)
 class ForceOffset:
-    """The constant ``force`` (2,), N, that would make the predictions of a fit better, and its standard ``deviation`` (2,)."""
+    """The constant ``force`` (2,), N, that would make the predictions of a fit better, and its standard ``deviation`` (2,).
+
+    On a rail it is (1,), along it.
+    """
 
     force: Array
     deviation: Array
@@ -30,9 +33,9 @@ class ForceOffset:
 
     def words(self) -> str:
         """The force and what may be its cause."""
-        x, y = self.force
+        parts = ", ".join(f"{part:.2g}" for part in self.force)
         return (
-            f"a constant force of ({x:.2g}, {y:.2g}) N acts on the rig that the log lacks: an offset of the force sensor (tare "
+            f"a constant force of ({parts}) N acts on the rig that the log lacks: an offset of the force sensor (tare "
             "it), a cable that pulls, a hand that is not logged"
         )
 
@@ -43,9 +46,11 @@ def force_offset(fit: Fit) -> ForceOffset:
     free, residual = problem.settled(fit.theta)
     windows = problem.offsets.corrected()
     columns = []
-    for axis in range(2):
-        forces = windows.trial.forces + STEP * np.eye(2)[:, [axis]]
-        pushed = replace(windows, trial=replace(windows.trial, forces=forces))
+    trial, angle = windows.trial, problem.rig_at(fit.theta).linkage.inclination
+    directions = np.eye(2) if trial.axes == 2 else np.array([[np.cos(angle), np.sin(angle)]])
+    for direction in directions:
+        forces = trial.forces + STEP * direction[:, None]
+        pushed = replace(windows, trial=replace(trial, forces=forces))
         columns.append((predicted(pushed, problem.noise, [fit.rig], free[None])[0] - residual) / STEP)
     found = one_step(fit, np.stack(columns, axis=2))
     return ForceOffset(found.value, found.deviation)

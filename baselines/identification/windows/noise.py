@@ -24,7 +24,7 @@ POOR = 2.5
 
 def is_fitting(windows: Windows, residual: Array) -> bool:
     """Whether residuals (W, R + F), over the noise, are those of a fit that tells something."""
-    counted = float(np.sum(windows.pressure_weights**2) + 2.0 * np.sum(windows.position_weights**2))
+    counted = float(np.sum(windows.pressure_weights**2) + windows.trial.axes * np.sum(windows.position_weights**2))
     return float(np.sum(residual**2)) < POOR**2 * counted
 
 
@@ -33,7 +33,8 @@ def guessed_noise(trial: Trial) -> Noise:
     seen = trial.positions[:, fresh_rows(trial.positions)]
     # That of encoders is several times larger along one axis than along the other.
     axes = [seen] if trial.counted is None else [axis[None] for axis in seen]
-    pressure, position = noise_of(trial.pressures), float(np.sqrt(np.mean([noise_of(one) ** 2 for one in axes])))
+    count = 1 if trial.counted is None else trial.axes
+    pressure, position = noise_of(trial.pressures), float(np.sqrt(sum(noise_of(one) ** 2 for one in axes) / count))
     return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
 
 
@@ -55,7 +56,7 @@ def noise_from(windows: Windows, noise: Noise, slopes: Slopes, residual: Array) 
     found = []
     for part, counted, before in (
         (slice(0, pressures), float(np.sum(windows.pressure_weights**2)), noise.pressure),
-        (slice(pressures, last), 2 * float(np.sum(windows.position_weights**2)), noise.position),
+        (slice(pressures, last), windows.trial.axes * float(np.sum(windows.position_weights**2)), noise.position),
     ):
         freedom = counted - float(np.sum(slopes.basis[:, part] ** 2))
         found.append(before * float(np.sum(residual[:, part] ** 2) / max(freedom, 1.0)) ** 0.5)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.identification.windows.prediction import predict
-from baselines.identification.windows.windows import BRISTLES, FREE, Windows, coulomb_levels_of
+from baselines.identification.windows.windows import BRISTLES, Windows, coulomb_levels_of
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -31,8 +31,6 @@ MOST_STEPS = 8
 
 WORSE = 1.15
 """A window whose residuals are so many times the median is begun anew; of 1100 numbers chance makes 1.1."""
-
-BRISTLE_ROWS = tuple(FREE.index(row) for row in BRISTLES)
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,10 @@ def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> 
     signs_of_both = itertools.product((-1.0, 0.0, 1.0), repeat=2)
     for signs, others in itertools.product(signs_of_both, (best[bad], np.zeros_like(best[bad]))):
         bent = others.copy()
-        for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, levels, signs, strict=True):
+        for row, level, sign in zip(BRISTLES, levels, signs, strict=True):
+            if row not in part.free:
+                continue
+            free_row = part.free.index(row)
             bent[:, free_row] = (sign * level / windows.stiffness - part.state[row]) / windows.spread[free_row]
         tries.append(bent)
     found, left = settle(windows.some(np.tile(bad, len(tries))), noise, rig, np.concatenate(tries), None)

@@ -40,6 +40,9 @@ ENOUGH = 0.5
 FREE = (at.Y1, at.V1, at.Y2, at.V2, at.Z1, at.Z2, at.PP1, at.PN1, at.PP2, at.PN2, at.TP1, at.TN1, at.TP2, at.TN2)
 """Rows of the state that a window's start leaves free; the spools follow from the openings before it."""
 
+OF_CYLINDER_1 = (at.Y1, at.V1, at.Z1, at.PP1, at.PN1, at.TP1, at.TN1)
+"""Those that stand still on a rail."""
+
 SUPPLY, ENDS = at.STATES, tuple(range(at.STATES + 1, at.STATES + 5))
 """Further rows of the state of a rig with options: pressures of the supply and at the valves' ends of the four tubes."""
 
@@ -133,7 +136,7 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
         arrived[w, : len(found)], valid[w, : len(found)] = found - start, True
     pressures = np.stack([trial.pressures[:, s : s + k].T for s in starts])
     positions = np.nan_to_num(trial.positions.T[starts[:, None] + arrived])
-    known = np.isfinite(pressures)
+    known = np.isfinite(pressures)  # of a rail nothing in the first two chambers
     return Windows(
         trial,
         k,
@@ -164,8 +167,10 @@ def _further(state: Array, rig: Parameters) -> Array:
 
 def free_rows(rig: Parameters) -> tuple[int, ...]:
     """Rows of a rig's state that a window's start leaves free."""
-    supply = (SUPPLY,) if rig.air.supply_conductance else ()
-    return (*FREE, *supply, *(ENDS if rig.chambers.tube_length else ()))
+    chambers, supply = rig.linkage.topology.chambers, (SUPPLY,) if rig.air.supply_conductance else ()
+    idle = () if len(chambers) == 4 else OF_CYLINDER_1
+    ends = tuple(ENDS[k] for k in chambers) if rig.chambers.tube_length else ()
+    return (*(row for row in FREE if row not in idle), *supply, *ends)
 
 
 def _measured(trial: Trial, starts: NDArray[np.intp], k: int, lag: int, fresh: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -173,7 +178,7 @@ def _measured(trial: Trial, starts: NDArray[np.intp], k: int, lag: int, fresh: N
     lost = _before(np.zeros(len(trial.times), dtype=np.bool_) if trial.unknown is None else trial.unknown)
     ends, settled = starts + k, np.maximum(starts - round(SETTLED / trial.period), 0)
     driven = lost[ends] == lost[settled]
-    cells = _before(numbers(trial.pressures))
+    cells = _before(numbers(trial.pressures[list(trial.topology.chambers)]))
     told = cells[ends] - cells[starts] > ENOUGH * k
     count = np.searchsorted(fresh, ends + lag) - np.searchsorted(fresh, starts + lag)
     some = fresh[np.clip(np.searchsorted(fresh, starts)[:, None] + np.arange(-NEAREST, NEAREST), 0, len(fresh) - 1)]
@@ -206,9 +211,12 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     joints = np.empty((4, len(starts)))
     pistons_at(motion, Rig(column), joints)
     state[[at.Y1, at.Y2, at.V1, at.V2]] = joints
+    state[[at.Y1, at.V1]] *= column[at.FREE]
     wide = 2 * round(0.005 / period) + 3
     smooth = savgol_filter(bridged(trial.pressures), wide, 2, axis=1)
-    state[list(at.PRESSURES)] = smooth[:, starts]
+    state[list(at.PRESSURES)] = column[at.ATMOSPHERE]
+    measured = list(trial.topology.chambers)
+    state[np.array(at.PRESSURES)[measured]] = smooth[measured][:, starts]
     state[[at.Z1, at.Z2]] = np.tanh(state[[at.V1, at.V2]] / 0.01) * coulomb_levels_of(state, column) / column[at.S0]
     state[list(at.TEMPERATURES)] = column[at.TEMPERATURE]
     return np.concatenate([state, _further(state, rig)]) if has_options(rig) else state

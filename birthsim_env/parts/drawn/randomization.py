@@ -56,7 +56,7 @@ def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, 
     """
     ranges: dict[str, tuple[Any, ...]] = {}
     for dotted, one in DECLARED.items():
-        if one.range and not one.on_request:
+        if one.range and not one.on_request and nominal.linkage.topology.has(dotted):
             section, _, name = dotted.partition(".")
             value, low, high = getattr(getattr(nominal, section), name), *one.range
             if value != getattr(SECTIONS[section], name):

@@ -18,6 +18,8 @@ class AlternatingSteps(ForceProfile):
     STARTS = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0), (6.9, 7.7))
     """Assumed: start and end of the four pushes, s; every push ends well before the next."""
 
+    directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+
     jump_rate = 1.0
     """N/s: every ramp is a step, however small the push."""
 
@@ -36,9 +38,8 @@ class AlternatingSteps(ForceProfile):
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
-        directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
         for k in range(self.repeats):
-            for (start, end), (dx, dy) in zip(self.STARTS, directions, strict=True):
+            for (start, end), (dx, dy) in zip(self.STARTS, self.directions, strict=True):
                 size = draw(self.amplitude, rng)
                 begin, stop = k * self.repeat + start, k * self.repeat + end
                 knots += [(begin, 0.0, 0.0), (begin + self.ramp, size * dx, size * dy)]

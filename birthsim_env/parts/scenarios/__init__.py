@@ -6,11 +6,13 @@ All values in them are assumed unless a source stands beside them; (0.5, 0) m is
 
 import inspect
 import re
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.topology import TWO_CYLINDERS
 from birthsim_env.registry import entries, entry
 
 MEASURED_RIG = "its rig has the valves and seals that others measured (docs/validation.md), and its worlds are drawn anew"
@@ -41,6 +43,15 @@ class Scenario:
     studied: ClassVar[bool] = False
     """Whether studies measure it. Reference scores, fingerprints and a training's configuration are then stored of it."""
 
+    linkage: ClassVar[str] = TWO_CYLINDERS
+    """``linkage.kind`` of the rigs that it is for; without ``parameters`` it is done with the default one of them."""
+
+    def on(self, rig: Parameters) -> Self:
+        """Itself, as it is on a rig; ``ValueError`` for a rig that it is not for."""
+        if rig.linkage.kind != self.linkage:
+            raise ValueError(f"parameters: linkage.kind = {rig.linkage.kind!r} in {self.title!r}; allowed: {self.linkage!r}")
+        return self
+
     @property
     def experiment(self) -> str:
         """What happens in it, in a line."""
@@ -59,6 +70,18 @@ def find_scenario(name: str) -> Scenario:
     """The scenario that is registered under a name; ``ValueError`` names those that there are."""
     found: Scenario = entry("scenario", name).made()
     return found
+
+
+def rig_of(name: str, parameters: Any) -> Parameters:
+    """The rig of the scenario ``name``: ``parameters``, as ``load_parameters`` takes them, else the default that it is for."""
+    if parameters is not None:
+        return load_parameters(parameters)
+    return Parameters().replace({"linkage.kind": find_scenario(name).linkage})
+
+
+def scenarios_for(rig: Parameters) -> list[str]:
+    """Names of the scenarios that can be done with a rig."""
+    return [one.name for one in entries("scenario") if one.made.linkage == rig.linkage.kind]
 
 
 def studied_scenarios() -> list[str]:

@@ -14,6 +14,9 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import COS_GAMMA3, D_PRODUCT, D_SQUARES, K1, K2, SIN_GAMMA3, V1, V2, Y1, Y2, Array
 from birthsim_env.physics.rig.parameters import Parameters
 
+OFF_RAIL = 1e-6
+"""m that the locked cylinder would have to move for a place that still counts as on the rail: rounding in a user's file."""
+
 
 @helper
 def s_squared(w: float, d_product: float) -> float:
@@ -107,6 +110,9 @@ def end_effector(piston: ArrayLike, parameters: Parameters) -> Array:
 def workspace(parameters: Parameters) -> str:
     """The reachable set in words, for error messages."""
     y1, y2 = parameters.cylinder1.stroke / 2, parameters.cylinder2.stroke / 2
+    if parameters.linkage.is_rail:
+        k2, angle = parameters.geometry.k2, parameters.linkage.inclination
+        return f"distance {k2 - y2:.4g} to {k2 + y2:.4g} m from the pivot, along the rail, {angle:.4g} rad above x"
     low, high = np.sort(theta1(np.array([-y1, y1]), parameters)) - math.pi / 2
     k2 = parameters.geometry.k2
     return f"distance {k2 - y2:.4g} to {k2 + y2:.4g} m from the pivot of cylinder 2, {low:.4g} to {high:.4g} rad above x"
@@ -127,6 +133,8 @@ def inverse_geometry(position: ArrayLike, parameters: Parameters) -> Array:
     # On the other branch of theta1 (linkage folded over) the direct model would not return to the point.
     branch = np.cos(gamma3 - np.arctan2(x, -y)) > 0
     inside = np.all(np.abs(piston) <= half + 1e-12, axis=0) & branch
+    if parameters.linkage.is_rail:
+        inside &= np.abs(piston[0]) <= OFF_RAIL
     if not np.all(inside):
         first = int(np.argmin(inside))
         point = (float(np.ravel(x)[first]), float(np.ravel(y)[first]))

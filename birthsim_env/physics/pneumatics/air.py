@@ -55,8 +55,8 @@ def orifice_flows(
     ``inverse`` is 1/P of the chamber, ``inside`` the coldness of its air.
     """
     fill, drain = driving_flows(p, i, pressure, inverse, inside)
-    supply = valves.edge_conductance(opening, supply_edge(p, i, k), p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    exhaust = valves.edge_conductance(-opening, exhaust_edge(p, i, k), p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    supply = valves.edge_conductance(opening, supply_edge(p, i, k), p[at.CONDUCTANCE, i], p[at.LEAKAGE_P1 + k, i])
+    exhaust = valves.edge_conductance(-opening, exhaust_edge(p, i, k), p[at.CONDUCTANCE, i], p[at.LEAKAGE_P1 + k, i])
     return supply * fill, exhaust * drain
 
 

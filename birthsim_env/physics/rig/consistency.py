@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from birthsim_env.physics.step import STEP
@@ -21,13 +23,22 @@ def check_together(rig: "Parameters") -> None:
 
 
 def _check_linkage(rig: "Parameters") -> None:
-    g = rig.geometry
+    g, has = rig.geometry, rig.linkage.topology.has
+    if rig.linkage.is_rail:
+        for name, value in rig.linkage.locked_geometry(g.d3, g.d6).items():
+            if getattr(g, name) != value:
+                raise ValueError(
+                    f"Geometry.{name} = {getattr(g, name)!r} is impossible on a rail; allowed: {value!r}, which follows from "
+                    f"linkage.inclination = {rig.linkage.inclination!r} rad where it is not named"
+                )
     for name, offset, cylinder in (("k1", g.k1, rig.cylinder1), ("k2", g.k2, rig.cylinder2)):
-        if offset <= 0.55 * cylinder.stroke:
+        if has(f"cylinder{name[-1]}") and offset <= 0.55 * cylinder.stroke:
             raise ValueError(
                 f"Geometry.{name} = {offset!r} is impossible; allowed: more than {0.55 * cylinder.stroke:g} m, "
                 f"0.55 strokes, so that the cylinder's length stays positive"
             )
+    if not has("cylinder1"):
+        return
     shortest, longest = abs(g.d3 - g.d6), g.d3 + g.d6
     least, most = g.k1 - rig.cylinder1.stroke / 2, g.k1 + rig.cylinder1.stroke / 2
     if not shortest * 1.05 < least < most < longest * 0.98:
@@ -48,8 +59,8 @@ def _check_dead_volume(rig: "Parameters") -> None:
 
 
 def _check_stability(rig: "Parameters") -> None:
-    f, viscous = rig.friction, max(rig.cylinder1.viscous_friction, rig.cylinder2.viscous_friction)
-    coulomb = max(rig.cylinder1.coulomb_friction, rig.cylinder2.coulomb_friction)
+    f, moving = rig.friction, [getattr(rig, name) for name in rig.linkage.topology.cylinder_names]
+    viscous, coulomb = (max(getattr(one, f"{name}_friction") for one in moving) for name in ("viscous", "coulomb"))
     damping = viscous + (coulomb / f.sign_speed if f.law == "coulomb" else f.bristle_damping)
     m = rig.mechanics
     damping /= 1 - m.mode_mass_fraction if m.mode_frequency else 1
@@ -79,7 +90,7 @@ def settling_volume(rig: "Parameters") -> float:
 
 def least_dead_volume(rig: "Parameters") -> float:
     """The least possible of a rig, m3: ``STOP_DEPTH`` of its largest piston."""
-    return STOP_DEPTH * max(rig.cylinder1.area_p, rig.cylinder2.area_p)
+    return float(STOP_DEPTH * max(getattr(rig, name).area_p for name in rig.linkage.topology.cylinder_names))
 
 
 def follow(parts: dict[str, Any], rig: "Parameters", changes: dict[str, Any]) -> None:
@@ -88,14 +99,18 @@ def follow(parts: dict[str, Any], rig: "Parameters", changes: dict[str, Any]) ->
     def part(name: str) -> Any:
         return parts.get(name, getattr(rig, name))
 
-    def bore(one: Any, other: Any) -> float:
-        return float(max(one.area_p, other.area_p))
+    def bore(own: Callable[[str], Any]) -> float:
+        return float(max(own(name).area_p for name in part("linkage").topology.cylinder_names))
 
-    grown = bore(part("cylinder1"), part("cylinder2")) / bore(rig.cylinder1, rig.cylinder2)
+    grown = bore(part) / bore(partial(getattr, rig))
     if grown != 1.0 and "chambers.dead_volume" not in changes:
         parts["chambers"] = dataclasses.replace(part("chambers"), dead_volume=grown * rig.chambers.dead_volume)
     g = part("geometry")
-    if not {"geometry.d3", "geometry.d6", "geometry.k1"} & set(changes):
+    if part("linkage").is_rail:
+        named = {name for section, _, name in (dotted.partition(".") for dotted in changes) if section == "geometry"}
+        own = part("linkage").locked_geometry(g.d3, g.d6)
+        g = dataclasses.replace(g, **{name: value for name, value in own.items() if name not in named})
+    elif not {"geometry.d3", "geometry.d6", "geometry.k1"} & set(changes):
         room = 1.9 * min(0.98 * (g.d3 + g.d6) - g.k1, g.k1 - 1.05 * abs(g.d3 - g.d6))
         longer = max(1.0, part("cylinder1").stroke / max(room, rig.cylinder1.stroke))
         if longer > 1.0:

@@ -17,11 +17,12 @@ from birthsim_env.physics.rig.mechanical import Cylinder, Friction, Geometry, Me
 from birthsim_env.physics.rig.pneumatic import Air, Chambers
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.servovalves import Valve, Valves, edge_rows
+from birthsim_env.physics.rig.topology import Linkage, locked_rows
 from birthsim_env.physics.rig.values import in_line, is_finite, near, path_of, shown
 
 __all__ = [
-    "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters",
-    "Valve", "Valves", "load_parameters", "parameter_of", "value_of",
+    "DECLARED", "SECTIONS", "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Linkage", "Mechanics",
+    "Parameters", "Valve", "Valves", "load_parameters", "parameter_of", "value_of",
 ]  # fmt: skip
 
 
@@ -31,8 +32,10 @@ class Parameters:
 
     Parameters
     ----------
+    linkage : Linkage
+        Two cylinders, or one on a rail.
     geometry : Geometry
-        Of the linkage, m.
+        Of the linkage of two cylinders, m.
     cylinder1, cylinder2 : Cylinder
         Bores and strokes (m), friction of the seals (N, N s/m).
     mechanics : Mechanics
@@ -74,6 +77,7 @@ class Parameters:
     >>> env = birthsim.make("BirthSIM/Circle-v2", parameters=rig)
     """
 
+    linkage: Linkage = Linkage()
     geometry: Geometry = Geometry()
     cylinder1: Cylinder = Cylinder()
     cylinder2: Cylinder = Cylinder(stroke=0.400, coulomb_friction=11.7)
@@ -90,6 +94,7 @@ class Parameters:
     ranges: tuple[tuple[Any, ...], ...] = ()
 
     vars().update(edge_rows())
+    vars().update(locked_rows())
 
     def __post_init__(self) -> None:
         for name, part in SECTIONS.items():
@@ -106,7 +111,8 @@ class Parameters:
         """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``.
 
         Three parameters depend on bores and strokes, and follow where ``changes`` do not name them. The dead volume grows with
-        the largest piston, the linkage with a stroke of cylinder 1 that it has no room for, and k2 with a longer cylinder 2.
+        the largest piston, the linkage with a stroke of cylinder 1 that it has no room for, and k2 with a longer cylinder 2. A
+        rail has the gamma3 and k1 that its inclination asks for.
         """
         if not isinstance(changes, Mapping):
             raise ValueError(f"changes = {shown(changes)}; allowed: a mapping such as {{'mechanics.mass': 4.0}}")
@@ -124,7 +130,11 @@ class Parameters:
 
         Without ``options`` these (``declaration.Parameter``) are named only where they differ from their defaults.
         """
-        sections = {name: getattr(self, name).to_dict(options) for name in SECTIONS}
+        sections = {name: getattr(self, name).to_dict(options) for name in SECTIONS if self.linkage.topology.has(name)}
+        if not sections["linkage"]:
+            del sections["linkage"]  # what was stored of a rig before there were others stays equal
+        if self.linkage.is_rail:
+            del sections["geometry"]["gamma3"], sections["geometry"]["k1"]  # they follow
         table = {name: bounds[0] if name == FRICTION else list(bounds) for name, bounds in self.own_ranges.items()}
         return {**sections, **({RANDOMIZE: table} if table else {})}
 

@@ -45,7 +45,7 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     g, m, f, v, air = rig.geometry, rig.mechanics, rig.friction, rig.valves, rig.air
     cylinders = (rig.cylinder1, rig.cylinder2)
     pivot = g.d3 * np.exp(1j * g.gamma3)
-    linkage = np.array([pivot.real, pivot.imag, g.d6, g.k1, g.k2, m.mass, m.gravity])
+    linkage = np.array([pivot.real, pivot.imag, g.d6, g.k1, g.k2, m.mass, m.gravity, rig.linkage.is_rail])
     sizes = [(c.piston_diameter, c.rod_diameter, c.stroke) for c in cylinders]
     rubbing = [(c.coulomb_friction, c.pressure_friction, c.direction_asymmetry, c.viscous_friction) for c in cylinders]
     pistons = np.array([(*size, *level) for size, level in zip(sizes, rubbing, strict=True)])
@@ -152,7 +152,7 @@ def rates_and_levels(
     gas: Array,
 ) -> Array:
     """d(state)/dt, with the speeds of both pistons and their levels G(v) in ``found`` (4,)."""
-    ox, oy, d6, k1, k2, mass, gravity = linkage
+    ox, oy, d6, k1, k2, mass, gravity, is_rail = linkage
     supply, atmosphere, ambient, r, gamma, rho, t_ref = gas
     ds = np.zeros(len(s))
     x, y, vx, vy = s[0], s[1], s[2], s[3]
@@ -228,6 +228,8 @@ def rates_and_levels(
     ds[0], ds[1] = vx, vy
     ds[2] = (along[1] * ex + across * nx + push[0]) / mass
     ds[3] = (along[1] * ey + across * ny + push[1]) / mass - gravity
+    if is_rail:  # which bears whatever acts across it
+        ds[2], ds[3] = (ds[2] * ex + ds[3] * ey) * ex, (ds[2] * ex + ds[3] * ey) * ey
     return ds
 
 

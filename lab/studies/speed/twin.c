@@ -51,8 +51,8 @@ static inline void chamber(const row *x, const row *p, row *dx, int i, int press
     double wall = p[TEMPERATURE][i], area = p[area_row][i], gas = p[GAS][i], gamma = p[GAMMA][i];
 
     int valve = spool_row - S1P;
-    double supply = p[CONDUCTANCE][i] * opened(spool, p, SUPPLY_OVERLAP_P1 + valve, i) + p[LEAKAGE][i];
-    double exhaust = p[CONDUCTANCE][i] * opened(-spool, p, EXHAUST_OVERLAP_P1 + valve, i) + p[LEAKAGE][i];
+    double supply = p[CONDUCTANCE][i] * opened(spool, p, SUPPLY_OVERLAP_P1 + valve, i) + p[LEAKAGE_P1 + valve][i];
+    double exhaust = p[CONDUCTANCE][i] * opened(-spool, p, EXHAUST_OVERLAP_P1 + valve, i) + p[LEAKAGE_P1 + valve][i];
     double q_in = orifice_flow(supply, p[SUPPLY][i], wall, pressure, temperature, p[RHO0][i], p[T0][i], p[CRITICAL][i]);
     double q_out = orifice_flow(exhaust, pressure, temperature, p[ATMOSPHERE][i], wall, p[RHO0][i], p[T0][i], p[CRITICAL][i]);
 
@@ -139,7 +139,7 @@ static void right_hand_side(const row *restrict x, const row *restrict u, const 
         /* Accelerations (5). */
         double transport = 2.0 * r4 * w * v1 * v1 / s2 + 2.0 * v1 * v2 / r2 + v1 * v1 / r4;
         dx[Y1][i] = v1;
-        dx[V1][i] = force1 / (p[MASS][i] * kappa * kappa) + p[GRAVITY][i] * sine / kappa - transport;
+        dx[V1][i] = force1 * p[INVERSE_MASS1][i] / (kappa * kappa) + p[GRAVITY1][i] * sine / kappa - transport;
         dx[Y2][i] = v2;
         dx[V2][i] = force2 / p[MASS][i] + p[GRAVITY][i] * cosine + 4.0 * r2 * r4 * r4 * v1 * v1 / s2;
         dx[Z1][i] = dz1;
@@ -149,7 +149,7 @@ static void right_hand_side(const row *restrict x, const row *restrict u, const 
         chamber(x, p, dx, i, PN1, TN1, TP1, S1N, AREA_N1, PERIMETER1, p[HALF_L1][i] - y1, -v1);
         chamber(x, p, dx, i, PP2, TP2, TN2, S2P, AREA_P2, PERIMETER2, p[HALF_L2][i] + y2, v2);
         chamber(x, p, dx, i, PN2, TN2, TP2, S2N, AREA_N2, PERIMETER2, p[HALF_L2][i] - y2, -v2);
-        for (int k = 0; k < 4; k++) dx[S1P + k][i] = (u[k][i] - x[S1P + k][i]) / p[TAU][i];
+        for (int k = 0; k < 4; k++) dx[S1P + k][i] = (u[k][i] - x[S1P + k][i]) * p[k < 2 ? SPOOL_RATE1 : SPOOL_RATE][i];
     }
 }
 
