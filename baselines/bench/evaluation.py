@@ -112,7 +112,8 @@ class Evaluation:
             "required_strength_ratio": self.required_strength_ratio,
             "returns": self.returns,
             "success": self.success,
-            "remarks": self.remarks,
+            # Without remarks the file is that of a controller that makes none, as entries of the leaderboard have it.
+            **({"remarks": self.remarks} if self.remarks else {}),
         }
 
 

@@ -5,6 +5,8 @@ end. A lane that leaves the physical range is lost: it is measured no further, a
 it harms nothing.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,7 @@ from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import compliance
 from birthsim_env.loop.stage import Stage, scratch, table3
 from birthsim_env.outcome import Ends
+from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.compiled.records import Numbers, number, part, row, rows
@@ -117,7 +120,9 @@ class Measures:
         limits = reward.Limits.numbers(
             period=period, jumped_below=period - 0.5 * period, impact_speed=simulation.parameters.mechanics.impact_speed
         )
-        constants = Constants.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
+        # NumPy's power differs between processors in its last bits.
+        discounts = [exact.number("exp", exact.number("log2", one) * math.log(2) * (period / 0.01)) for one in DISCOUNTS]
+        constants = Constants.numbers(limits=limits, every=every, discounts=np.array(discounts))
         measure = Stage(_measure, constants, self.own.rows, (window(lanes, period), self.error))
         rewards = Stage(_reward, constants, self.own.rows)
         # Once the valves are commanded; once target, hand and rig are at the new instant, before the sensors look.
