@@ -129,7 +129,7 @@ def test_a_mapping_draws_just_its_parameters():
     assert 6e5 <= drawn["supply"].min() < 6.05e5
     assert 7.95e5 < drawn["supply"].max() <= 8e5
     varied = {name for name, values in drawn.items() if np.ptp(values)}
-    assert varied == {"mass", "inverse_mass", "supply", "inverse_supply", "source"}
+    assert varied == {"mass", "inverse_mass", "inverse_mass1", "supply", "inverse_supply", "source"}
 
 
 def test_a_draw_does_not_depend_on_the_order_of_the_names():

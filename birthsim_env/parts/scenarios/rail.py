@@ -31,6 +31,9 @@ class Rail(Scenario):
     duration = 16.0
     linkage = RAIL
 
+    def __init__(self) -> None:
+        self._rig = Parameters().replace({"linkage.kind": RAIL})
+
     def on(self, rig: Parameters) -> Self:
         super().on(rig)
         self._rig = rig

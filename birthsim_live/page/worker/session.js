@@ -151,6 +151,7 @@ export class Session {
     this.loop.rows.set(column);
     this.loop.set("rig_mass", mass);
     this.loop.set("rig_inverse_mass", 1 / mass);
+    this.loop.set("rig_inverse_mass1", 1 / mass);
     coulomb.forEach((force, k) => {
       this.loop.set(`rig_fc${k + 1}`, force * friction);
       this.loop.set(`rig_fp${k + 1}`, pressed[k] * friction);

@@ -8,7 +8,7 @@ import pytest
 from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
 from birthsim_env import Parameters, StiffnessSchedule, UserForce
 from birthsim_env.loop.rows import AT_VALVE, SINCE_JUMP
-from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.parts.scenarios import find_scenario, scenarios_for
 from birthsim_env.registry import names
 from birthsim_live.rig.folder import packed_page, write_page
 from birthsim_live.rig.words import LEARNING
@@ -114,7 +114,7 @@ def test_every_scenario_with_every_sensor(page):
         page,
         *(
             ({"scenario": one, "sensors": kind, "scenario_force": True}, None)
-            for one in names("scenario")
+            for one in scenarios_for(DEFAULT)
             for kind in names("sensors")
         ),
     )

@@ -7,9 +7,8 @@ import pytest
 
 from birthsim_build.stages import LEAST_TIME, PACE
 from birthsim_env import Circle, FixedTarget, Parameters
-from birthsim_env.parts.scenarios import find_scenario
+from birthsim_env.parts.scenarios import find_scenario, scenarios_for
 from birthsim_env.physics.linkage.geometry import inverse_geometry
-from birthsim_env.registry import names
 from tests.live.rig.course import Course
 
 
@@ -31,7 +30,7 @@ def test_a_bridge_meets_both_ends_and_its_derivatives_are_true():
         assert np.abs((here[2:] - here[:-2]) / (2 * step) - rate[1:-1]).max() < 1e-5 * np.abs(rate).max()
 
 
-@pytest.mark.parametrize(("first", "second"), list(permutations(names("scenario"), 2)))
+@pytest.mark.parametrize(("first", "second"), list(permutations(scenarios_for(Parameters()), 2)))
 def test_bridges_between_scenarios_stay_in_the_workspace(first, second):
     for now in (0.7, 2.9):
         course = Course(find_scenario(first).nominal()[0])
