@@ -87,12 +87,19 @@ def test_rows_by_number_are_found():
 
 GIVEN = {
     "baselines/estimation/hand/quiet_force.py": {f"{name}[{axis}, i]" for name in ("force", "found") for axis in (0, 1)},
+    "agents/residual/corrected.py": {"action[valve - 2 * first, i]"},
+    "baselines/bench/metrics.py": {"command[0, i]", "command[1, i]"},
+    "baselines/estimation/hand/bristle_filter.py": {"_yielding(_way(v) * z / slack, law)[0]"},
+    "baselines/estimation/hand/bristled_pistons.py": {"pose[5]"},
+    "baselines/estimation/stages.py": {"scratch(1)[0, :n]"},
+    "birthsim_env/observation.py": {"scales[each * k + each - 1]", "pair[1]", "pair[0]"},
     "baselines/estimation/dry_friction.py": {"pressures[2 * cylinder, i]", "pressures[2 * cylinder + 1, i]"},
     "baselines/identification/windows/tracks.py": {"known[0, i]", "known[1 + k, i]", "flows[4 + k, i]"},
     "lab/studies/bandwidth/valves.py": {"pressures[2 * k, 0]", "pressures[2 * k + 1, 0]"},
 }
 """Arguments that are one named group of whoever calls: x and y, or chambers P1, N1, P2, N2. In tracks.py: the supply's
-pressure and then those of the tubes' ends; flows from the supply and then those to the atmosphere, (8, N)."""
+pressure and then those of the tubes' ends; flows from the supply and then those to the atmosphere, (8, N). In corrected.py and
+observation.py: entries of a rail, which begin with cylinder 2. pose and _yielding give tuples."""
 
 
 def test_kernels_name_their_rows():
