@@ -5,6 +5,7 @@ registry says, what it learns the constants that its kernels read (``baselines.n
 """
 
 from functools import cache
+from typing import NamedTuple
 
 from baselines.controller import RESIDUAL
 from baselines.named import bare_name, learns_mass, uses_force
@@ -40,6 +41,24 @@ def informed(name: str, *sensors: str, rig: str = DEFAULT, parameters: str = "")
         TOML file of the rig that it believes, from the root; "" for the default one.
     """
     return [rig, _yes(_learns(name, sensors, parameters)), _yes(uses_force(name))]
+
+
+class Row(NamedTuple):
+    """A controller, what it is told of its rig, and the TOML file of a rig with more sensors, from the root; "" for none."""
+
+    controller: str
+    rig: str = DEFAULT
+    file: str = ""
+
+    def facts(self, *sensors: str) -> list[str]:
+        """Entries of ``COLUMNS`` with ``sensors``."""
+        return informed(self.controller, *sensors, rig=self.rig, parameters=self.file)
+
+    @property
+    def name(self) -> str:
+        """Its name in a head of a column, which has no others beside it that say what it is told."""
+        more = [word for word, said in ((self.rig, self.rig == TOLD), ("accelerometer", self.file)) if said]
+        return f"`{self.controller}`" + (f" ({', '.join(more)})" if more else "")
 
 
 def informed_if_registered(name: str, *sensors: str) -> list[str]:

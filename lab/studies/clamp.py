@@ -1,7 +1,7 @@
 """How much controllers tremble in hands of several stiffnesses, on rigs that are drawn and frictions of the sweep."""
 
 from itertools import product
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import register
 from lab.engine import information
+from lab.engine.information import Row
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -28,19 +29,6 @@ SENSORS = "honest"
 
 LANES = 64
 """Worlds of a piece."""
-
-
-class Row(NamedTuple):
-    """A controller, what it is told of its rig, and the TOML file of a rig with more sensors, from the root; "" for none."""
-
-    controller: str
-    rig: str = information.DEFAULT
-    file: str = ""
-
-    @property
-    def facts(self) -> list[str]:
-        """Entries of ``information.COLUMNS``."""
-        return information.informed(self.controller, SENSORS, rig=self.rig, parameters=self.file)
 
 
 BEST = (Row("admittance-adaptive"), Row("admittance-adaptive", information.TOLD))
@@ -131,11 +119,11 @@ def _shown(content: Content) -> dict[str, str]:
         lost = str(sum(one["lost"] for one in held))
         name = f"`{row.controller}`" + (" with an acceleration sensor" if row.file else "")
         felt = [cells(one["force"][:2]) for one in held]
-        whole.append([name, *row.facts, *felt, cells(middle["press"][:2]), cells(middle["air"][:2]), lost])
+        whole.append([name, *row.facts(SENSORS), *felt, cells(middle["press"][:2]), cells(middle["air"][:2]), lost])
     frictions = [["controller", *information.COLUMNS, *(f"`{name}`" for name in settings["friction"])]]
     for row in BEST:
         felt = [cells(by[row, (CLAMP, DAMPING), name]["force"][:2]) for name in settings["friction"]]
-        frictions.append([f"`{row.controller}`", *row.facts, *felt])
+        frictions.append([f"`{row.controller}`", *row.facts(SENSORS), *felt])
     said = (
         f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS} sensors, rigs drawn, spring of {STIFFNESS / 1e3:g} kN/m. "
         "Cells: force that the hand feels, N peak to peak, in the last 2 s of 5, median and 95th percentile, by the hand's "

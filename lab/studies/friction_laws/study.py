@@ -2,10 +2,11 @@
 
 The sweep is that of ``birthsim_env.parts.drawn.frictions``. Rigs and scenarios are drawn; a seed has the same rig under every
 friction. All controllers believe the default friction, but for those that are told each rig, as after an identification: these
-know its levels, bristles and Stribeck speed. No controller follows another law than LuGre, whatever it is told.
+know its levels, bristles and Stribeck speed, but not its law. With an acceleration sensor the controller weighs laws by itself;
+all others follow LuGre.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.registry import names, register
 from lab.engine import information
+from lab.engine.information import Row
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
@@ -24,25 +26,6 @@ from lab.studies.comparison.grid import Conditions, cell_task, gather, settings_
 from lab.studies.comparison.privileged import TOLD
 
 SENSORS = "honest"
-
-
-class Row(NamedTuple):
-    """A controller, what it is told of its rig, and the TOML file of a rig with more sensors, from the root; "" for none."""
-
-    controller: str
-    rig: str = information.DEFAULT
-    file: str = ""
-
-    @property
-    def facts(self) -> list[str]:
-        """Entries of ``information.COLUMNS``."""
-        return information.informed(self.controller, SENSORS, rig=self.rig, parameters=self.file)
-
-    @property
-    def name(self) -> str:
-        """Its name in heads of columns."""
-        more = [word for word, said in ((self.rig, self.rig == information.TOLD), ("accelerometer", self.file)) if said]
-        return f"`{self.controller}`" + (f" ({', '.join(more)})" if more else "")
 
 
 ROWS = (
@@ -115,7 +98,7 @@ def _shown(content: Content) -> dict[str, str]:
             worst = max(by, key=lambda friction: _size(by[friction][metric][1]))
             figures += [cells(by[ASSUMED][metric]) if ASSUMED in by else "", f"{cells(by[worst][metric])} `{worst}`"]
         lost = sum(one["lost"] for one in by.values())
-        whole.append([row.name, *row.facts, *figures, str(lost)])
+        whole.append([row.name, *row.facts(SENSORS), *figures, str(lost)])
     tables = []
     for metric, (_, head) in METRICS.items():
         rows = [["friction", *(row.name for row in found)]]
