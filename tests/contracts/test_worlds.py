@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.parts.scenarios import environment_id, rig_of
 from birthsim_env.registry import names
 
 ARGUMENTS = {
@@ -30,16 +29,17 @@ WORLDS = st.fixed_dictionaries(
 )
 
 
-def corner(seed):
-    """A rig whose every figure that may be randomised is at one end of its range."""
-    rng, law = np.random.default_rng(seed), ("lugre", "coulomb")[seed % 2]
-    ends = {name: float(rng.choice(ends)) for name, ends in documented_ranges(Parameters()).items()}
-    return Parameters().replace({**ends, "friction.law": law})
+def corner(scenario, seed):
+    """A rig of a scenario whose every figure that may be randomised is at one end of its range."""
+    rng, law, rig = np.random.default_rng(seed), ("lugre", "coulomb")[seed % 2], rig_of(scenario, None)
+    ends = {name: float(rng.choice(ends)) for name, ends in documented_ranges(rig).items()}
+    return rig.replace({**ends, "friction.law": law})
 
 
 def walked(world):
     """What an environment returns under random actions, checked as it comes; a rig that is not drawn is at a corner."""
-    arguments = {"parameters": None if world["arguments"]["randomize"] in (True, "plant") else corner(world["seed"])}
+    drawn = world["arguments"]["randomize"] in (True, "plant")
+    arguments = {"parameters": None if drawn else corner(world["scenario"], world["seed"])}
     env = gymnasium.make_vec(environment_id(world["scenario"]), num_envs=world["num_envs"], **arguments, **world["arguments"])
     observation, info = env.reset(seed=world["seed"])
     rng, returned = np.random.default_rng(world["seed"]), [observation]

@@ -4,10 +4,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-from birthsim_env import Reference, StiffnessSchedule, reward
+from birthsim_env import Parameters, Reference, StiffnessSchedule, reward
 from birthsim_env.loop.rows import World
 from birthsim_env.parts.scenarios import environment_id
-from birthsim_env.physics.compiled.lanes import PRESSURES, TEMPERATURES, Y1, Y2
+from birthsim_env.physics.compiled.lanes import PRESSURES, TEMPERATURES, Y1, Y2, parameter_column
 
 CIRCLE, PROBE, FORCEPS, DESCENT = (environment_id(name) for name in ("circle", "probe", "forceps", "descent"))
 TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
@@ -72,11 +72,11 @@ def test_every_term_is_its_formula_of_info(name, period, arguments):
         assert len(jumps) > 1
 
 
-def assess(lanes=1, policy_period=0.01, **changes):
+def assess(lanes=1, policy_period=0.01, rig=None, **changes):
     """Terms by name, (N,), and failures of healthy lanes at rest on their target, without a jump, apart from ``changes``."""
     world, reference = World(np.zeros((World.size, lanes))), Reference(np.zeros((Reference.size, lanes)))
     world.state[list(PRESSURES)], world.state[list(TEMPERATURES)] = 3e5, 293.0
-    world.since_jump[:] = policy_period
+    world.since_jump[:], world.rig[:] = policy_period, parameter_column(rig or Parameters())[:, None]
     reference.position[0], reference.stiffness[:], world.motion.position[0] = 0.5, 2000.0, 0.5
     given = {
         **{name: getattr(world, name) for name in ("state", "force", "since_jump", "impact")},
@@ -126,6 +126,17 @@ def test_no_cost_is_beyond_the_largest(row, value):
     terms, _ = assess(motion=motion)
     name, cost = ("reward_tracking", np.log(1001)) if row < 2 else ("reward_hunting", 0.2 * np.log(1001))
     assert terms[name] == pytest.approx(-cost / LARGEST)
+
+
+@pytest.mark.parametrize("degrees", [-40.0, 0.0, 90.0])
+def test_a_rail_pays_for_what_is_along_it_alone(degrees):
+    angle, along, across = np.radians(degrees), 3e-3, 5e-3
+    rig = Parameters().replace({"linkage.kind": "rail", "linkage.inclination": angle})
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    off, fast = turn @ [along, across], turn @ [10 * along, across]
+    terms, _ = assess(rig=rig, motion=np.array([0.5 + off[0], off[1], *fast])[:, None])
+    assert terms["reward_tracking"] == pytest.approx(-np.log(1 + along / 1e-3) / LARGEST)
+    assert terms["reward_hunting"] == pytest.approx(-0.2 * np.log(1 + 10 * along / 0.01) / LARGEST)
 
 
 PRESSURE = ((0.19e5, True), (0.21e5, False), (19.9e5, False), (20.1e5, True), (np.nan, True))

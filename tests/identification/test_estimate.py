@@ -116,7 +116,7 @@ def test_a_start_with_a_bristle_bent_the_wrong_way_is_mended() -> None:
     windows = cut(part(trial(), 0, 2500), TRUE)
     noise = guessed_noise(trial())
     wrong = dataclasses.replace(windows, state=windows.state.copy())
-    free = np.zeros((len(windows.starts), len(starts.FREE)))
+    free = np.zeros((len(windows.starts), len(windows.free)))
     fine = starts.begun_anew(windows, noise, TRUE, free)
     cost = np.sum(starts.predicted(windows, noise, [TRUE], fine[None])[0] ** 2, axis=1)
     rows = windows.length * 4 + 2 * windows.valid.sum(axis=1)

@@ -12,10 +12,9 @@ from agents.residual.settings import ResidualSettings
 from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.parts.scenarios import environment_id, scenarios_for
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
-from birthsim_env.registry import names
 from tests.oracles import closed_loop
 
 PROBE, CIRCLE = "BirthSIM/ProbeResidual-v3", "BirthSIM/CircleResidual-v2"
@@ -163,7 +162,7 @@ def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
         np.testing.assert_array_equal(inside.simulation.openings.T, action)
 
 
-@pytest.mark.parametrize("scenario", names("scenario"))
+@pytest.mark.parametrize("scenario", scenarios_for(Parameters()))
 def test_whatever_a_policy_says_there_are_gains(scenario: str) -> None:
     """All entries at their limits, in all combinations: a law without gains would refuse by an exception."""
     corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 5)).reshape(5, -1).T.astype(np.float32)

@@ -15,7 +15,7 @@ import agents
 from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
 from baselines.named import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
-from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.parts.scenarios import environment_id, rig_of
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
@@ -75,7 +75,8 @@ def world_of(number: int, seed: int) -> World:
 
     scenario = names("scenario")[number % len(names("scenario"))]
     friction, sensors, randomize = one(FRICTION), one(names("sensors")), one(VARIED)
-    ranges = documented_ranges(Parameters())
+    rig = rig_of(scenario, None)
+    ranges = documented_ranges(rig)
     corner = {name: float(one(bounds)) for name, bounds in ranges.items()} if randomize is not True else {}
     hand = one([None, None, None, *names("hand")])
     kind = rng.random()
@@ -84,7 +85,8 @@ def world_of(number: int, seed: int) -> World:
         control = f"random {arguments['action_mode']}s"
     elif kind < 0.92:
         law = one(LAWS)
-        impedance = "fixed" if law == NO_LAW or law.startswith("admittance") else one(list(IMPEDANCES))
+        fixed = law == NO_LAW or law.startswith("admittance") or rig.linkage.is_rail
+        impedance = "fixed" if fixed else one(list(IMPEDANCES))
         arguments = {"law": law, "impedance": impedance}
         control = "residual without a law" if law == NO_LAW else f"residual on {law}"
     else:
@@ -129,7 +131,7 @@ def run(number: int, seed: int, lanes: int = LANES, steps: int = STEPS, progress
     """Run a lap; a fault ends it."""
     world = world_of(number, seed)
     lap, began = Lap(number, world.scenario, world.control, 0, 0.0, 0, 0, 0.0), time.perf_counter()
-    rig = Parameters().replace({**world.corner, "friction.law": world.friction})
+    rig = rig_of(world.scenario, None).replace({**world.corner, "friction.law": world.friction})
     residual = "law" in world.arguments
     env: Any = gymnasium.make_vec(
         environment_id(world.scenario, "Residual" if residual else ""),

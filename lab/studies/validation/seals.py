@@ -55,7 +55,7 @@ def file_of(data: Path, seal: str, bar: int) -> Path:
 def motion(file: Path) -> Array:
     """Speed (m/s), gauge pressure (bar) and friction with an offset (N) every ``PERIOD``, (3, T)."""
     table = read_table("--data", file)
-    time, *measured = (table.column(name)[SETTLED:] for name in ("time", "laser_mm", "pressure_bar_gauge", "force_N"))
+    time, *measured = (table.column(name)[SETTLED:] for name in ("time", "laser_mm", "pressure_bar_gauge", "force"))
     even = np.arange(time[0], time[-1], 1e3 * PERIOD)
     place, pressure, force = (np.interp(even, time, one) for one in measured)
     smooth = savgol_filter(1e-3 * place, WINDOW, 2)
