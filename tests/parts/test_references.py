@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from birthsim_env import Circle, FixedTarget, Parameters, Path, Trajectory
 from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.position_steps import PositionSteps
 from birthsim_env.parts.scenarios import environment_id, find_scenario, scenarios_for
 from birthsim_env.physics.linkage.geometry import end_effector
 from birthsim_env.registry import names
@@ -57,6 +58,9 @@ def test_derivatives_of_every_scenario_fit_together(name, kind, seed):
         gone = np.linalg.norm(sampled(trajectory, times)[:2].T - start, axis=1)
         edges = [trajectory.begins, trajectory.ends] + ([times[np.argmax(gone > length)]] if arc else [])
         times = times[np.abs(times[:, None] - edges).min(axis=1) > 0.03]
+    if isinstance(trajectory, PositionSteps):  # steps of jerk where a move starts and ends
+        edges = np.add.outer(trajectory.starts, [0.0, trajectory.lasts]).ravel()
+        times = times[np.abs(times[:, None] - edges).min(axis=1) > 0.001]
     assert_consistent(trajectory, times)
 
 
