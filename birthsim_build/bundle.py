@@ -39,14 +39,20 @@ class Bundle:
         for (scenario, sensors), world in self.worlds.items():
             for (controller, sampled), law in self.laws.items():
                 if sampled == world.sampled:
-                    name = f"{scenario}_{sensors}_{identifier(controller)}"
-                    named[name] = image_of(world.rows, {"law": law, **world.parts}, functions)
+                    named[loop_name(scenario, sensors, controller)] = image_of(
+                        world.rows, {"law": law, **world.parts}, functions
+                    )
         return named
 
 
 def identifier(name: str) -> str:
     """A name as C takes it."""
     return re.sub(r"\W", "_", name)
+
+
+def loop_name(scenario: str, sensors: str, controller: str) -> str:
+    """The name of a closed loop as C takes it."""
+    return "_".join(map(identifier, (scenario, sensors, controller)))
 
 
 def scenario_of(environment: str) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from birthsim_build.bundle import identifier
+from birthsim_build.bundle import loop_name
 from birthsim_build.device.beginning import beginning_with
 from birthsim_build.device.loops import SEVERAL, controlled
 from birthsim_build.device.program import Pieces, Program, key_of, program_of
@@ -26,7 +26,7 @@ def write_programs(
     made: dict[str, tuple[Episodes, Pieces, Pieces]] = {}
     for scenario, sensors, controller in loops:
         many, other = (controlled(scenario, sensors, rig, controller, 0, lanes) for lanes in SEVERAL)
-        name = f"{scenario}_{sensors}_{identifier(controller)}"
+        name = loop_name(scenario, sensors, controller)
         made[name] = many, beginning_with(many), beginning_with(other)
     functions = sorted({function for _, pieces, _ in made.values() for function in pieces.functions})
     space, data = 0, {}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_build.bundle import identifier
+from birthsim_build.bundle import loop_name
 from birthsim_build.code.blocks import WIDTH
 from birthsim_build.code.threads import Threads
 from birthsim_build.code.tools import run_tool
@@ -92,7 +92,7 @@ def thread_rows(loops: Sequence[tuple[str, str, str]], rig: Parameters, folder: 
     run, lanes = Host().load(tuple(functions), Threads(space)), WIDTH + 1
     starts = np.concatenate([[np.arange(lanes)], np.zeros((Start.size, lanes), dtype=np.int64)])
     for scenario, sensors, controller in loops:
-        name = f"{scenario}_{sensors}_{identifier(controller)}"
+        name = loop_name(scenario, sensors, controller)
         words, about = np.fromfile(folder / f"{name}.bin", dtype=np.int64), json.loads((folder / f"{name}.json").read_text())
         data, kept = np.zeros((about["words_of_data"], lanes)), np.full((periods, ROWS), np.nan)
         own = [(ROW[row], at) for row, at in about["rows"].items() if row in ROW]

@@ -11,7 +11,7 @@ from typing import Any
 from baselines.named import compiled_names
 from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_threads, build_wasm
-from birthsim_build.bundle import Bundle, identifier, make_bundle
+from birthsim_build.bundle import Bundle, identifier, loop_name, make_bundle
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.targets import HOST
 from birthsim_build.estimate import CYCLES
@@ -65,7 +65,7 @@ class Case:
 
 def _loop(scenario: str, sensors: str, controller: str) -> Case:
     choice = {"scenario": scenario, "sensors": sensors, "controller": controller}
-    name = f"{scenario}_{sensors}_{identifier(controller)}"
+    name = loop_name(scenario, sensors, controller)
     python = lambda: (None, loop_rows(scenario, sensors, controller)[:, SHARED])  # noqa: E731
     return Case(f"{scenario}, {sensors}, {controller}", ["loop", choice], name, SHARED, python)
 
