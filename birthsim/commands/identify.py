@@ -39,7 +39,7 @@ class Settings(Configured):
     log: Annotated[Path | None, TABLE] = field(default=None, kw_only=False)
     """A table of time, openings, pressures, positions, forces; the endings below."""
     columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
-    """What columns of the log are called, such as force_x=Fz,force_y=none."""
+    """What columns of the log are called, such as force_x=Fz,force_y=none; opening=u*0.2-1 of one in volts."""
     skip: Annotated[int | None, whole(0)] = None
     """Lines of the log before its heading, where it is not found by itself."""
     decimal_comma: bool = False
