@@ -144,11 +144,9 @@ def test_what_is_not_for_one_cylinder_is_refused_by_name(arguments, named):
     assert all(word in str(refused.value) for word in named)
 
 
-def test_datasets_and_the_page_do_not_know_a_rail_yet_and_say_so(tmp_path):
+def test_the_page_does_not_know_a_rail_yet_and_says_so(tmp_path):
     RIG.to_toml(tmp_path / "rail.toml")
     page = live.Settings(parameters=str(tmp_path / "rail.toml"), static=tmp_path / "page")
     with pytest.raises(ValueError, match=r"linkage\.kind = 'rail': .*allowed: 'two-cylinders'"):
         live.main(page)
-    with pytest.raises(ValueError, match=r"linkage\.kind = 'rail': .*allowed: 'two-cylinders'"):
-        birthsim.export("minari", env="BirthSIM/Rail-v0", level="random", out=tmp_path / "datasets")
     assert [one.name for one in tmp_path.iterdir()] == ["rail.toml"]
