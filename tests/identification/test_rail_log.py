@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import birthsim
+from baselines.figures.identification import residuals_figure
 from baselines.identification.experiment import propose, read_plan
 from baselines.identification.fit.free_parameters import free_of
 from baselines.identification.laboratory import run_plan
@@ -144,3 +145,6 @@ def test_the_rig_that_made_a_log_is_found(columns, tmp_path):
     pressed = 2 * 2.5e5 * found.rig.cylinder2.pressure_friction
     assert found.rig.cylinder2.coulomb_friction + pressed == pytest.approx(15.0 + 2 * 2.5e5 * 5e-6, rel=0.02)
     assert not [line for line in found.words() if "cylinder 1" in line]
+    with np.errstate(all="raise"):  # nothing is drawn of what the rig has not
+        assert [path.name for path in residuals_figure(found, tmp_path)] == ["residuals.png", "residuals.svg"]
+    assert "chamber P1" not in (tmp_path / "residuals.svg").read_text()
