@@ -38,7 +38,8 @@ def identify(
     parameters : Parameters, path, mapping or None
         The rig as its owner knows it, which gives what a log cannot tell.
     columns : mapping of str to str, optional
-        What columns of the log are called, ``{"force_x": "Fz", "force_y": "none"}``.
+        What columns of the log are called, ``{"force_x": "Fz", "force_y": "none"}``; of one in volts also how it becomes SI,
+        ``{"opening": "u*0.2-1"}``.
     skip : int, optional
         Lines of the log before its heading, where that is not found by itself.
     decimal_comma : bool

@@ -27,14 +27,16 @@ def residuals_figure(found: Identified, folder: Path) -> list[Path]:
     pressures = residual[:, :chambers].reshape(count, -1, 4) * problem.noise.pressure
     positions = residual[:, chambers:].reshape(count, -1)[:, : windows.positions.shape[1] * 2].reshape(count, -1, 2)
     positions = positions[windows.valid] * problem.noise.position
+    topology = windows.trial.topology
+    pressures = pressures[..., list(topology.chambers)]
     period, starts = windows.trial.period, windows.trial.times[windows.starts][:, None]
     times = starts + period * np.arange(pressures.shape[1])
     arrived = (starts + period * windows.arrived)[windows.valid]
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 1, figsize=(COLUMN, 5.2), layout="constrained")
         after = 0.0
-        for k, name in enumerate(CHAMBERS):
-            style = {**look(k), "label": f"chamber {name}"}
+        for k, chamber in enumerate(topology.chambers):
+            style = {**look(chamber), "label": f"chamber {topology.name_of(CHAMBERS[chamber])}"}
             axes[0].plot(*_rms(times.ravel(), pressures[..., k].ravel()), **style)
             lags, values = _correlation(pressures[..., k])
             after = max(after, float(np.abs(values[1:]).max()))
@@ -53,7 +55,7 @@ def residuals_figure(found: Identified, folder: Path) -> list[Path]:
         axes[2].axhspan(-limit, limit, color="#888888", alpha=0.3, lw=0, label="white noise, 95 %")
         over = [
             np.sqrt(np.mean(pressures**2)) / problem.noise.pressure,
-            np.sqrt(np.mean(positions**2)) / problem.noise.position,
+            np.sqrt(np.mean(np.sum(positions**2, axis=1)) / len(topology.cylinders)) / problem.noise.position,
         ]
         headline(
             figure,

@@ -8,7 +8,7 @@ them from the one that does not. The law keeps the pistons away from the end sto
 is.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +98,21 @@ def propose(rig: Parameters, duration: float, seed: int = 0) -> Plan:
     idle = [k for k in range(4) if k not in rig.linkage.topology.chambers]
     added[idle], piston[[k // 2 for k in idle]] = 0.0, 0.0
     return Plan(times, end_effector(piston, rig), added, _stiffness(times))
+
+
+def suited(plan: Plan, rig: Parameters) -> Plan:
+    """The plan with the pneumatic stiffness at which a rig's chambers have the pressures that the default one's have in it.
+
+    At mid stroke the stiffness of a cylinder is proportional to pressure times piston areas over stroke (9): what is soft for a
+    short narrow cylinder would empty the chambers of a long wide one. On the default rig it is the plan itself.
+    """
+    return replace(plan, stiffness=plan.asked() * np.transpose([_reach(rig) / _reach(Parameters())]))
+
+
+def _reach(rig: Parameters) -> Array:
+    """Supply pressure times piston areas over stroke of both cylinders (2,), N/m."""
+    areas = np.array([(one.area_p + one.area_n) / one.stroke for one in (rig.cylinder1, rig.cylinder2)])
+    return np.asarray(rig.air.supply_pressure * areas)
 
 
 def _stiffness(times: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from baselines.identification.experiment import DURATION, propose, read_plan
+from baselines.identification.experiment import DURATION, propose, read_plan, suited
 from baselines.identification.fit.free_parameters import unmeasured
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
@@ -39,7 +39,7 @@ class Settings(Configured):
     log: Annotated[Path | None, TABLE] = field(default=None, kw_only=False)
     """A table of time, openings, pressures, positions, forces; the endings below."""
     columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
-    """What columns of the log are called, such as force_x=Fz,force_y=none."""
+    """What columns of the log are called, such as force_x=Fz,force_y=none; opening=u*0.2-1 of one in volts."""
     skip: Annotated[int | None, whole(0)] = None
     """Lines of the log before its heading, where it is not found by itself."""
     decimal_comma: bool = False
@@ -97,7 +97,7 @@ def _propose(settings: Settings, path: Path, rig: Parameters) -> None:
         raise ValueError("--out is given; allowed with LOG or --simulate, --propose names its own file")
     if path.suffix.lower() != ".csv":
         raise ValueError(f"--propose {str(path)!r}; allowed: a file that ends in .csv")
-    plan = propose(rig, DURATION if settings.duration is None else settings.duration, settings.seed)
+    plan = suited(propose(rig, DURATION if settings.duration is None else settings.duration, settings.seed), rig)
     plan.write(path)
     print(f"written to {path}: {len(plan.times)} rows of time, target and openings to add to a controller's")
 

@@ -5,13 +5,13 @@ units; each is a keyword of its constructor. Where low is positive the gain is s
 linear one. That holds for names of the registry and for ``path/to/file.py:Class``.
 
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
-the documented ranges. The worlds are those of ``Circle-v2``, rig and scenario drawn, and of the stiffness test of
-``baselines.bench.probes``, with each sensor model. With ``--friction drawn`` every rig has one of several friction laws, which
-the controller does not know (``birthsim_env.parts.drawn.frictions``). That is an option and no default, so that the commands
-that pages name still find the gains that are stored. The loss of a lane is in mm: on the circle the settled error, in the
-stiffness test the error of the displacement at full force plus the hunting. A lost lane costs ``WORST``, and no lane more. The
-cost is the sum over scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the
-gains of a file. The next trials are drawn at random; Optuna's TPE sampler proposes the rest.
+the documented ranges. The worlds are those of ``Circle-v2``, of one cylinder ``Rail-v0``, rig and scenario drawn, and of the
+stiffness test of ``baselines.bench.probes``, with each sensor model. With ``--friction drawn`` every rig has one of several
+friction laws, which the controller does not know (``birthsim_env.parts.drawn.frictions``). That is an option and no default, so
+that the commands that pages name still find the gains that are stored. The loss of a lane is in mm: in the scenario the settled
+error, in the stiffness test the error of the displacement at full force plus the hunting. A lost lane costs ``WORST``, and no
+lane more. The cost is the sum over scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every
+range, or the gains of a file. The next trials are drawn at random; Optuna's TPE sampler proposes the rest.
 """
 
 from __future__ import annotations
@@ -41,9 +41,12 @@ from birthsim_env.files import own_folder, whole_results, write_json
 from birthsim_env.parts.drawn.frictions import with_friction
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.topology import RAIL, TWO_CYLINDERS
 from birthsim_env.physics.rig.values import is_within, shown
 from birthsim_env.registry import entries
 
@@ -65,6 +68,12 @@ LANES, TRIALS = 4096, 100_000
 
 RANDOM = 20
 """Trials before the sampler models their costs: the start and those drawn at random."""
+
+FOLLOWED = {TWO_CYLINDERS: "circle", RAIL: "rail"}
+"""``linkage.kind`` -> the scenario whose target a controller follows."""
+
+PLACES = (0.0, -0.6, 0.3, -0.3, 0.6)
+"""Halves of the stroke from mid stroke at which a rail is pushed; assumed."""
 
 Gains = dict[str, float]
 Bounds = dict[str, tuple[float, float]]
@@ -97,12 +106,18 @@ def start_of(path: Path | None, bounds: Bounds) -> Gains:
 
 
 def probes(rig: Parameters, lanes: int) -> StiffnessTest:
-    """Stiffness tests on drawn rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
+    """Stiffness tests on drawn rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y, or along a rail."""
     rigs = [draw_parameters(rig, documented_ranges(rig), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
     rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
-    force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
-    force[lane % 2, lane] = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes)
+    size, stiffness = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes), np.zeros((3, lanes))
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
+    if rig.linkage.is_rail:
+        stiffness[1] = stiffness[0]
+        direction = np.array(exact.direction(rig.linkage.inclination))[:, None]
+        along = rig.geometry.k2 + 0.5 * rig.cylinder2.stroke * np.resize(PLACES, lanes)
+        return StiffnessTest(direction * along, direction * size, stiffness, rigs)
+    force = np.zeros((2, lanes))
+    force[lane % 2, lane] = size
     return StiffnessTest(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
 
 
@@ -115,16 +130,16 @@ def robust(losses: Array) -> float:
 def costs(
     controller: Controller, rig: Parameters, sensors: tuple[str, ...], lanes: int, seconds: float = 8.0, **own: Any
 ) -> dict[str, float]:
-    """What a controller costs, mm, part by part; ``seconds`` is that of the circle, which may have a reference and hand of its
-    ``own``."""
-    parts = {}
+    """What a controller costs, mm, part by part; ``seconds`` is that of the scenario of ``FOLLOWED``, which may have a
+    reference and hand of its ``own``."""
+    parts, followed = {}, FOLLOWED[rig.linkage.kind]
     periods = round(seconds / rig.electronics.control_period)
     setting: dict[str, Any] = {"randomize": True, "parameters": rig, "max_episode_steps": periods, "progress": False, **own}
     for kind in sensors:
-        circle = evaluate("BirthSIM/Circle-v2", controller, "", lanes, WORLDS, sensors=kind, **setting)
-        if len(circle.seeds) < lanes:
+        course = evaluate(environment_id(followed), controller, "", lanes, WORLDS, sensors=kind, **setting)
+        if len(course.seeds) < lanes:
             raise KeyboardInterrupt  # which ``evaluate`` has caught, to keep what is complete
-        parts[f"circle, {kind}"] = robust(penalize_lost(circle.metrics["settled_rms"], circle.lost, True))
+        parts[f"{followed}, {kind}"] = robust(penalize_lost(course.metrics["settled_rms"], course.lost, True))
         answers = run_stiffness_test(probes(rig, lanes), controller, kind, WORLDS)
         missed = np.hypot(*(answers.displacement - answers.expected)) + answers.hunting.max(axis=0)
         parts[f"stiffness test, {kind}"] = robust(penalize_lost(1e3 * missed, answers.lost, True))
@@ -208,7 +223,8 @@ def main(settings: Settings) -> None:
         "sensors": list(sensors), "lanes": settings.lanes,
     }  # fmt: skip
     study = begun(start)
-    check_world("BirthSIM/Circle-v2", parameters=rig, randomize=True, **own)  # which compiles: Optuna is looked for before
+    followed = environment_id(FOLLOWED[rig.linkage.kind])
+    check_world(followed, parameters=rig, randomize=True, **own)  # which compiles: Optuna is looked for before
     trials: list[dict[str, Any]] = []
     interrupt: KeyboardInterrupt | None = None
     print(described(rig, True))

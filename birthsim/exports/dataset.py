@@ -20,12 +20,12 @@ from baselines.named import make_controller
 from birthsim.command_line.settings import EPISODES, WORLD, Configured, Env, Seed, whole
 from birthsim.command_line.worlds import check_environment, policy_of
 from birthsim.exports import Form
-from birthsim_env import Parameters, __version__, normalized_score, reference_scores
+from birthsim_env import __version__, normalized_score, reference_scores
 from birthsim_env.files import make_folder, whole_folder, write_text
 from birthsim_env.ids import rig_for
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.topology import refuse_rail
 from birthsim_env.registry import register
+from birthsim_env.scores import is_scored
 
 PERIOD = 0.005
 """s: an action is held so long. The controller `admittance` scores 87 to 100 with it, and 53 to 88 with 10 ms."""
@@ -78,7 +78,6 @@ class Recorded:
 
 def main(settings: Settings) -> None:
     """Record, and say what the dataset is worth."""
-    refuse_rail(rig_for(settings.env, None), "a dataset")
     try:
         import minari
         from minari.data_collector import EpisodeBuffer
@@ -88,7 +87,10 @@ def main(settings: Settings) -> None:
     out, name = make_folder(settings.out).resolve(), f"birthsim/{policy_of(settings.env)}/{settings.level}-v0"
     if (out / name).exists():
         raise ValueError(f"--out {str(settings.out)!r} has {name} already; allowed: another folder")
-    known = reference_scores(settings.env)
+    scores: dict[str, float] = {}
+    if is_scored(settings.env):
+        known = reference_scores(settings.env)
+        scores = {"ref_min_score": known["shut valves"]["return"], "ref_max_score": known["best classical law"]["return"]}
     episodes = list(recorded(settings.env, settings.level, range(settings.seed, settings.seed + settings.episodes)))
     check_room(episodes, out)
     text = card(settings, name, episodes)
@@ -109,8 +111,7 @@ def main(settings: Settings) -> None:
             author="The BirthSIM developers",
             description=text,
             requirements=[f"birthsim=={__version__}"],
-            ref_min_score=known["shut valves"]["return"],
-            ref_max_score=known["best classical law"]["return"],
+            **scores,
         )
         write_text(place / name / "README.md", text)
     print(text)
@@ -162,12 +163,14 @@ def recorded(environment: str, level: str, seeds: range) -> Iterator[Recorded]:
 def _batch(environment: str, level: str, seeds: list[int]) -> Iterator[Recorded]:
     env = made(environment, gymnasium.make_vec, num_envs=len(seeds))
     name, generators = LEVELS[level], [np.random.default_rng([seed, 1]) for seed in seeds]
-    law = name and make_controller(name, Parameters().replace({"electronics.control_period": PERIOD}))
+    rig = rig_for(environment, None)
+    driven = list(rig.linkage.topology.chambers)
+    law = name and make_controller(name, rig.replace({"electronics.control_period": PERIOD}))
     seen: list[Any] = [env.reset(seed=seeds)[0]]
     acted, rewards, terminated, over = list[Any](), list[Any](), list[Any](), list[Any]()
     for _ in range(env.steps):
         if law:
-            action = np.array(law.command(env.measurement, env.reference)).T
+            action = np.array(law.command(env.measurement, env.reference))[driven].T
             if level == "medium":
                 action += NOISE * np.array([generator.standard_normal(action.shape[1]) for generator in generators])
         else:
@@ -193,8 +196,13 @@ def _batch(environment: str, level: str, seeds: list[int]) -> Iterator[Recorded]
 def card(settings: Settings, name: str, episodes: list[Recorded]) -> str:
     """The dataset's card, in the format of the Hugging Face Hub."""
     returns = np.array([one.rewards.sum() for one in episodes])
-    scores = np.asarray(normalized_score(settings.env, returns))
-    low, high = np.quantile(scores, [0.05, 0.95])
+    row = worth = ""
+    if is_scored(settings.env):
+        scores = np.asarray(normalized_score(settings.env, returns))
+        low, high = np.quantile(scores, [0.05, 0.95])
+        row = f"\n| score, mean; 5th and 95th percentile | {scores.mean():.1f}; {low:.1f}, {high:.1f} |"
+        best = "that of the best controller at 1 kHz (`ref_max_score`)"
+        worth = f"A score of 0 is that of shut valves (`ref_min_score`), 100 {best}.\n"
     who = {"expert": "The controller `admittance`", "paper": "The paper's controller", "random": "Uniform actions"}
     medium = f"The controller `admittance`, with Gaussian noise of {NOISE:g} on its actions,"
     return f"""---
@@ -212,11 +220,9 @@ Actions open valves, and are held for {1e3 * PERIOD:g} ms.
 |---|---|
 | episodes; of them terminated | {len(episodes)}; {sum(one.terminated for one in episodes)} |
 | steps | {sum(len(one.rewards) for one in episodes)} |
-| return, mean | {returns.mean():.1f} |
-| score, mean; 5th and 95th percentile | {scores.mean():.1f}; {low:.1f}, {high:.1f} |
+| return, mean | {returns.mean():.1f} |{row}
 
-A score of 0 is that of shut valves (`ref_min_score`), 100 that of the best controller at 1 kHz (`ref_max_score`).
-The data are simulated. They say nothing of a real rig or of a birth.
+{worth}The data are simulated. They say nothing of a real rig or of a birth.
 
 The seed of an episode starts it again in `gymnasium.make("{settings.env}", randomize=True, policy_period={PERIOD:g})`.
 

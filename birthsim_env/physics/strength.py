@@ -22,11 +22,13 @@ def carried(position: Array, rig: Parameters) -> Array:
 
 
 def require_carried(position: Array, rig: Parameters) -> None:
-    """Raises ``ValueError`` for a rig that can hold its own weight at none of the positions (2, N), m."""
-    fractions = carried(position, rig)
+    """Raises ``ValueError`` for a rig that can hold its own weight at none of the positions (2, N), m; a rail bears what is
+    across it."""
+    cylinders = rig.linkage.topology.cylinders
+    fractions = carried(position, rig)[list(cylinders)]
     lane = int(fractions.max(axis=0).argmin())
-    cylinder = int(fractions[:, lane].argmax())
-    fraction = float(fractions[cylinder, lane])
+    cylinder = cylinders[int(fractions[:, lane].argmax())]
+    fraction = float(fractions[:, lane].max())
     if fraction > 1.0:
         x, y = position[:, lane]
         mass = rig.mechanics.mass

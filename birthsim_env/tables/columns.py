@@ -15,7 +15,7 @@ from birthsim_env.physics.rig.reading import named
 from birthsim_env.physics.rig.values import in_line
 from birthsim_env.registry import names
 from birthsim_env.tables.reading import read_table
-from birthsim_env.tables.selection import Selection, clock_note, mapping_of
+from birthsim_env.tables.selection import Mapped, Selection, clock_note, mapping_of
 from birthsim_env.tables.table import Reading, Table
 
 LARGEST = 64 * 2**20
@@ -43,7 +43,7 @@ def columns(kind: str, file: tuple[Path, str], units: Mapping[str, str], needed:
     listed = ", ".join(f"{name} ({units[name]})" for name in needed)
     expected = f"rows of {listed}, with increasing times"
     mapping = mapping_of(f"{kind} = {named(path)}:", names, needed) if names else {}
-    table = read_table(kind, path, Reading(names=frozenset(mapping.values()), most=LARGEST))
+    table = read_table(kind, path, Reading(names=frozenset(one.column for one in mapping.values()), most=LARGEST))
     if not table.headed:
         table = _in_order(table, list(units), needed, mapping)
     wanted = {name: units[name] for name in needed}
@@ -69,10 +69,11 @@ def columns(kind: str, file: tuple[Path, str], units: Mapping[str, str], needed:
     return rows
 
 
-def _in_order(table: Table, order: list[str], needed: Sequence[str], mapping: Mapping[str, str]) -> Table:
+def _in_order(table: Table, order: list[str], needed: Sequence[str], mapping: Mapping[str, Mapped]) -> Table:
     """A table without a heading whose columns are called as they stand in ``order``."""
     if mapping:
-        raise ValueError(f"{table.source} has no heading; allowed: one that names {in_line(', '.join(mapping.values()))}")
+        names = ", ".join(one.column for one in mapping.values())
+        raise ValueError(f"{table.source} has no heading; allowed: one that names {in_line(names)}")
     least, width = max(map(order.index, needed)) + 1, len(table.columns)
     if not least <= width <= len(order):
         raise ValueError(

@@ -1,6 +1,9 @@
 """Which columns of a table are used for what: by name, by another name of the same, or as a user maps them."""
 
+import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,13 +20,42 @@ NOTHING = "none"
 """What a user maps to say that there is no such column."""
 
 
-def mapping_of(argument: str, text: str, names: Sequence[str]) -> dict[str, str]:
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_SCALED = re.compile(rf"(.+?)\s*\*\s*([-+]?{_NUMBER})(?:\s*([-+])\s*({_NUMBER}))?")
+
+SCALED = "COLUMN*FACTOR+OFFSET"
+"""How a user turns the numbers of a column into SI: ``u*0.2-1`` is an opening where 5 V is shut and 10 V is open."""
+
+
+class Mapped(NamedTuple):
+    """The column that a user means, and how its numbers become SI: times ``factor`` plus ``offset``, or, where ``factor`` is 0,
+    as the unit of the heading says."""
+
+    column: str
+    factor: float = 0.0
+    offset: float = 0.0
+
+
+def _scaled(text: str) -> Mapped:
+    """What a user's ``COLUMN`` or ``COLUMN*FACTOR+OFFSET`` says."""
+    found = _SCALED.fullmatch(text)
+    if found is None:
+        return Mapped(text)
+    factor, offset = float(found[2]), float(f"{found[3] or ''}{found[4] or 0}")
+    if factor == 0 or not (math.isfinite(factor) and math.isfinite(offset)):
+        raise ValueError(
+            f"{in_line(text)} has the factor {factor:g} and the offset {offset:g}; allowed: finite ones, not times 0"
+        )
+    return Mapped(found[1], factor, offset)
+
+
+def mapping_of(argument: str, text: str, names: Sequence[str]) -> dict[str, Mapped]:
     """Name -> column, of a user's words: ``name=column,...``, or all columns in the order of ``names``.
 
-    ``ValueError`` names ``argument``, which may end in words of its own, as ``file.csv:`` does.
+    A column may be ``SCALED``. ``ValueError`` names ``argument``, which may end in words of its own, as ``file.csv:`` does.
     """
     parts = [part.strip() for part in text.split(",") if part.strip()]
-    allowed = f"allowed: NAME=COLUMN,..., or a COLUMN for each of {', '.join(names)}"
+    allowed = f"allowed: NAME=COLUMN,..., or a COLUMN for each of {', '.join(names)}; {SCALED} where it is not in SI"
     pairs = [part.partition("=") for part in parts]
     if parts and all(equals for _, equals, _ in pairs):
         found = {name.strip(): column.strip() for name, _, column in pairs}
@@ -35,10 +67,14 @@ def mapping_of(argument: str, text: str, names: Sequence[str]) -> dict[str, str]
         found = dict(zip(names, parts, strict=True))
     else:
         raise ValueError(f"{argument}{in_line(text)}; {allowed}")
-    columns = [column for column in found.values() if column != NOTHING]
+    try:
+        mapping = {name: _scaled(column) for name, column in found.items()}
+    except ValueError as error:
+        raise ValueError(f"{argument}{error}") from None
+    columns = [one for one in mapping.values() if one.column != NOTHING]
     if len(set(columns)) < len(columns) or len(found) < len(parts):
         raise ValueError(f"{argument}{in_line(text)} names one of them twice; {allowed}")
-    return found
+    return mapping
 
 
 class Selection:
@@ -48,9 +84,9 @@ class Selection:
     in errors how a user can name columns.
     """
 
-    def __init__(self, table: Table, fields: Mapping[str, str], mapping: Mapping[str, str], others: str) -> None:
-        self.table, self._fields, self._others = table, fields, others
-        self.used = {name: self._mapped(name, column) for name, column in mapping.items() if column != NOTHING}
+    def __init__(self, table: Table, fields: Mapping[str, str], mapping: Mapping[str, Mapped], others: str) -> None:
+        self.table, self._fields, self._mapping, self._others = table, fields, mapping, others
+        self.used = {name: self._mapped(name, one.column) for name, one in mapping.items() if one.column != NOTHING}
         for name in fields:
             if name not in mapping:
                 found = self._named(name)
@@ -113,12 +149,16 @@ class Selection:
         """The numbers of a field (T,) in SI; ``ValueError`` where the column has another unit, or cannot be used."""
         column, unit = self.used[name], self._fields[name]
         values = self.table.column(column)
+        _, factor, offset = self._mapping.get(name, Mapped(column))
+        if factor:
+            return np.asarray(values * factor + offset)
         said = self.table.units.get(column, "")
         if not said:
             return values
         found = unit_of(said)
         if found is None or found[0] != unit:
-            raise ValueError(f"{self.table.source} has {name!r} in {in_line(said)}; allowed: {units_for(unit)}")
+            allowed = f"{units_for(unit)}, or {name}={SCALED.replace('COLUMN', in_line(column))}"
+            raise ValueError(f"{self.table.source} has {name!r} in {in_line(said)}; allowed: {allowed}")
         return values if found[1] == 1 else np.asarray(values * found[1])
 
     def note(self, known: Iterable[str] = ()) -> str:

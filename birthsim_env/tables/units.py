@@ -21,6 +21,7 @@ UNITS: dict[str, tuple[str, float]] = {
         "psia": ("Pa", 6894.757293168),
     },
     **{"N/m": ("N/m", 1.0), "N/mm": ("N/m", 1e3), "kN/m": ("N/m", 1e3)},
+    **{"V": ("V", 1.0), "mV": ("V", 1e-3), "mA": ("A", 1e-3)},
     **dict.fromkeys(("1", "-"), ("1", 1.0)),
     **dict.fromkeys(("%", "percent"), ("1", 1e-2)),
 }

@@ -128,6 +128,30 @@ def test_probes_are_pushed_rigs_of_the_documented_ranges():
     assert again.rigs == probes.rigs[:20]
 
 
+RAIL = Parameters().replace({"linkage.kind": "rail", "linkage.inclination": 0.5})
+
+
+def test_probes_of_one_cylinder_push_along_its_rail():
+    probes = tune.probes(RAIL, 40)
+    along = np.array([np.cos(0.5), np.sin(0.5)])
+    places = along @ probes.position - RAIL.geometry.k2
+    np.testing.assert_allclose(probes.position, np.outer(along, along @ probes.position), atol=1e-12)
+    np.testing.assert_allclose(probes.force, np.outer(along, along @ probes.force), atol=1e-12)
+    assert np.abs(places).max() < 0.5 * RAIL.cylinder2.stroke - 40 / 1000
+    assert len(np.unique(np.round(places, 9))) == 5
+    assert {-1.0, 1.0} == set(np.sign(along @ probes.force))
+    np.testing.assert_array_equal(probes.stiffness[0], probes.stiffness[1])
+
+
+def test_costs_on_a_rail_tell_good_gains_from_bad_ones():
+    good, slack = (
+        tune.costs(make_controller("pid", RAIL, **gains), RAIL, ("encoders",), 3, 1.0)
+        for gains in ({}, {"bandwidth": 12.0, "integral_rate": 0.3})
+    )
+    assert set(good) == {"rail, encoders", "stiffness test, encoders"}
+    assert all(slack[part] > 1.2 * good[part] for part in good)
+
+
 def test_frictions_are_drawn_which_the_controller_does_not_know(own, tmp_path, monkeypatch, capsys):
     asked = []
 

@@ -1,6 +1,7 @@
 """BirthSIM/Rail-v0: one axis in spaces, rewards and metrics, at any inclination; what is not for one cylinder says so."""
 
 import math
+import re
 
 import gymnasium
 import numpy as np
@@ -11,8 +12,10 @@ from baselines.bench.metrics import NOT_OF_A_RAIL, UNITS
 from birthsim.commands import live
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
 from birthsim_env.parts.references import FixedTarget, Sine
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from tests.console import ROOT
 
+EXAMPLES = ROOT / "examples"
 TILT = math.radians(35.0)
 RIG = Parameters().replace({"linkage.kind": "rail", "linkage.inclination": TILT})
 ALONG = np.array([math.cos(TILT), math.sin(TILT)])
@@ -144,11 +147,37 @@ def test_what_is_not_for_one_cylinder_is_refused_by_name(arguments, named):
     assert all(word in str(refused.value) for word in named)
 
 
-def test_datasets_and_the_page_do_not_know_a_rail_yet_and_say_so(tmp_path):
+def test_the_page_does_not_know_a_rail_yet_and_says_so(tmp_path):
     RIG.to_toml(tmp_path / "rail.toml")
     page = live.Settings(parameters=str(tmp_path / "rail.toml"), static=tmp_path / "page")
     with pytest.raises(ValueError, match=r"linkage\.kind = 'rail': .*allowed: 'two-cylinders'"):
         live.main(page)
-    with pytest.raises(ValueError, match=r"linkage\.kind = 'rail': .*allowed: 'two-cylinders'"):
-        birthsim.export("minari", env="BirthSIM/Rail-v0", level="random", out=tmp_path / "datasets")
     assert [one.name for one in tmp_path.iterdir()] == ["rail.toml"]
+
+
+def test_a_level_rail_bears_a_mass_that_the_cylinder_could_not_lift():
+    heavy = RIG.replace({"mechanics.mass": 40.0, "linkage.inclination": 0.0})
+    birthsim.make("BirthSIM/Rail-v0", parameters=heavy).reset(seed=0)
+    upright = heavy.replace({"linkage.inclination": math.pi / 2})
+    with pytest.raises(ValueError, match=r"Mechanics\.mass = 40 kg .* cylinder 2"):
+        birthsim.make("BirthSIM/Rail-v0", parameters=upright).reset(seed=0)
+
+
+BENCHES = [path for path in sorted(EXAMPLES.glob("*_rig.toml")) if load_parameters(path).linkage.is_rail]
+
+
+@pytest.mark.parametrize("bench", BENCHES, ids=lambda path: path.stem)
+def test_benches_of_the_examples_are_whole_and_a_controller_moves_them(bench):
+    """Each names its source or says that it is assumed, parameter by parameter."""
+    lines = [line for line in bench.read_text(encoding="utf-8").splitlines() if re.match(r"[a-z_]+ = [\d.]", line)]
+    assert all("#" in line for line in lines)
+    rig = load_parameters(bench)
+    result = birthsim.evaluate(
+        "BirthSIM/Rail-v0", "admittance", parameters=rig, sensors="encoders", randomize=False, episodes=1, progress=False
+    )
+    assert not any(result.lost)
+    assert result.metrics["settled_rms"][0] < 1.0
+
+
+def test_there_are_three_published_benches():
+    assert len(BENCHES) >= 4

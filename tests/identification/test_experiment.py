@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baselines.identification import experiment
-from baselines.identification.experiment import TRAVEL, propose, read_plan
+from baselines.identification.experiment import TRAVEL, propose, read_plan, suited
 from baselines.identification.laboratory import run_plan
 from baselines.named import make_controller
 from birthsim_env.physics.linkage.geometry import inverse_geometry
@@ -58,3 +58,19 @@ def test_an_end_stop_is_named() -> None:
     plan = propose(OWNER, 4.0, 3)
     with pytest.raises(ValueError, match="a piston of rig 0 hits its end stop after"):
         run_plan(plan, [OWNER], make_controller("slammed-valves", OWNER), "lab", 0)
+
+
+def test_on_the_default_rig_the_suited_plan_is_the_plan() -> None:
+    plan = propose(Parameters(), 4.0, 3)
+    np.testing.assert_array_equal(suited(plan, Parameters()).asked(), plan.asked())
+
+
+def test_a_long_wide_cylinder_keeps_its_chambers_filled() -> None:
+    """Soft for a short narrow one is empty for it, and from empty chambers no valve is identified."""
+    bench = {"linkage": {"kind": "rail"}, "cylinder2": {"piston_diameter": 0.032, "rod_diameter": 0.012, "stroke": 0.3}}
+    rig = Parameters.from_dict(bench)
+    plan, law = propose(rig, 4.0, 3), make_controller("backstepping", rig)
+    least, kept = (run_plan(one, [rig], law, "encoders", 0)[0].pressures[2:] for one in (plan, suited(plan, rig)))
+    atmosphere = rig.air.atmospheric_pressure
+    assert np.quantile(least, 0.05) < 1.2 * atmosphere
+    assert np.quantile(kept, 0.05) > 1.5 * atmosphere

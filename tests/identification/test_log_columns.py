@@ -44,6 +44,18 @@ def test_a_force_under_another_name_is_a_force(x: str, y: str, tmp_path: Path) -
     np.testing.assert_allclose([found["force_x"][0], found["force_y"][0]], [7 * factor, -3 * factor])
 
 
+def test_one_voltage_moves_both_valves_of_a_cylinder(tmp_path: Path) -> None:
+    """Where two 3/2 valves hang on one output, N the other way round; so are two cylinders' logs in volts read."""
+    names = {"openings_P1": "u1 [V]", "openings_P2": "u2 [V]"}
+    columns = {name: values for name, values in content(names).items() if not name.startswith("openings_N")}
+    columns["u1 [V]"], columns["u2 [V]"] = np.array([5.0, 6.0, 7.0, 4.0, 10.0]), np.full(ROWS, 2.5)
+    said = "openings_P1=u1*0.2-1,openings_N1=u1*-0.2+1,openings_P2=u2*.2-1.0,openings_N2=u2*-2e-1+1"
+    found = read(tmp_path, columns, columns=said)
+    np.testing.assert_allclose(found["openings_P1"], [0.0, 0.2, 0.4, -0.2, 1.0], atol=1e-12)
+    np.testing.assert_allclose(found["openings_N1"], -found["openings_P1"], atol=1e-12)
+    np.testing.assert_allclose(found["openings_N2"], 0.5, atol=1e-12)
+
+
 LIKE = [
     *(("Fz", "Ft"), ("Fx_filt", "Fy_filt"), ("frc_x", "frc_y"), ("force_1", "force_2"), ("force", "foo"), ("Kraft_x", "q")),
     *(("load_x [N]", "load_y [N]"), ("loadCell1", "q"), ("wrench.x", "wrench.y"), ("ATI_Fx", "ATI_Fy"), ("fx raw (kg)", "q")),

@@ -115,7 +115,7 @@ BAD: dict[str, tuple[dict[str, Callable[[Array], Array] | None], str]] = {
                      "valves are commanded; it looks like ms, allowed: s, or time (ms)"),
     "gap": ({"time": lambda v: v + 0.5 * (np.arange(len(v)) >= 1000)},
             "row 1000: 501 ms after the row before, others 1 ms; allowed: evenly spaced rows"),
-    "volts": ({"openings": lambda v: 5 * v + 5}, "they look like V: an opening is (V - 5) / 5 where 5 V is shut"),
+    "volts": ({"openings": lambda v: 5 * v + 5}, "they look like V: --columns NAME=COLUMN*0.2-1 where 5 V is shut"),
     "percent": ({"openings": lambda v: 100 * v}, "they look like percent: an opening is percent / 100"),
     "valve": ({"openings_N2": still}, "openings_N2 never changes; allowed: valves that move, as in birthsim identify "),
     "bar": ({"pressures": lambda v: 1e-5 * v}, "they look like bar, allowed: absolute pressures in Pa"),

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import birthsim
+from baselines.figures.identification import residuals_figure
 from baselines.identification.experiment import propose, read_plan
 from baselines.identification.fit.free_parameters import free_of
 from baselines.identification.laboratory import run_plan
+from baselines.identification.log.log_columns import LogOptions
 from baselines.identification.log.log_file import read_trial, write_trial
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -55,6 +57,37 @@ def test_one_valve_is_taken_both_ways_round(columns, tmp_path):
     np.testing.assert_array_equal(found.openings[2], -found.openings[3])
     np.testing.assert_allclose(found.openings[2], one["opening"], atol=1e-9)
     assert not found.openings[:2].any()
+
+
+def test_a_bench_in_volts_is_read_by_factor_and_offset(columns, tmp_path):
+    """Of a valve with 5 V where it is shut and 10 V where it is open, gauge cells of 1 V/bar, and a potentiometer of 20 V/m."""
+    one = {"time": columns["time"], "u [V]": 5.0 + 5.0 * 0.3 * np.sin(40.0 * columns["time"])}
+    one |= {f"p_{side} [V]": (columns[f"pressures_{side}"] - 101325.0) / 1e5 for side in "PN"}
+    one["x [V]"] = 20.0 * (columns["position"] + 0.25)
+    path = written(one, tmp_path / "volts.csv")
+    said = "opening=u*0.2-1,pressures_P=p_P*1e5+101325,pressures_N=p_N * 1e5 + 101325,position=x*0.05-0.25"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = read_trial(path, KNOWN, LogOptions(said))
+    np.testing.assert_allclose(found.openings[2], 0.3 * np.sin(40.0 * columns["time"]), atol=1e-9)
+    np.testing.assert_allclose(found.openings[3], -found.openings[2], atol=0)
+    np.testing.assert_allclose(found.pressures[2:], [columns["pressures_P"], columns["pressures_N"]], rtol=1e-8)
+    along = np.hypot(*found.positions) - KNOWN.geometry.k2
+    np.testing.assert_allclose(along, columns["position"], atol=1e-9)
+
+
+def test_volts_without_factor_are_refused_with_the_way_out(columns, tmp_path):
+    one = {name: values for name, values in columns.items() if not name.startswith("openings")}
+    path = written(one | {"opening [V]": 5.0 + np.sin(40.0 * columns["time"])}, tmp_path / "volts.csv")
+    with pytest.raises(ValueError, match=r"opening=opening\*FACTOR\+OFFSET"):
+        read_trial(path, KNOWN)
+
+
+@pytest.mark.parametrize("said", ["opening=u*0", "opening=u*1e999", "opening=u*1-1e999"])
+def test_a_factor_that_loses_the_column_is_refused(columns, said, tmp_path):
+    path = written(columns | {"u": columns["openings_P"]}, tmp_path / "log.csv")
+    with pytest.raises(ValueError, match=r"--columns .*allowed: finite"):
+        read_trial(path, KNOWN, LogOptions(said))
 
 
 def test_a_log_without_force_says_so(columns, tmp_path):
@@ -112,3 +145,6 @@ def test_the_rig_that_made_a_log_is_found(columns, tmp_path):
     pressed = 2 * 2.5e5 * found.rig.cylinder2.pressure_friction
     assert found.rig.cylinder2.coulomb_friction + pressed == pytest.approx(15.0 + 2 * 2.5e5 * 5e-6, rel=0.02)
     assert not [line for line in found.words() if "cylinder 1" in line]
+    with np.errstate(all="raise"):  # nothing is drawn of what the rig has not
+        assert [path.name for path in residuals_figure(found, tmp_path)] == ["residuals.png", "residuals.svg"]
+    assert "chamber P1" not in (tmp_path / "residuals.svg").read_text()

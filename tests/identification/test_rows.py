@@ -147,7 +147,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
     "cells exchanged": (exchanged("pressures", 0, 1), "pressures_P1 follows openings_N1; columns look exchanged"),
     "valves exchanged": (exchanged("openings", 1, 3), "pressures_N1 follows openings_N2; columns look exchanged"),
     "valve the other way": (times("openings", -1.0, axis=2), "pressures_P2 falls where openings_P2 is above 0"),
-    "volts about zero": (times("openings", 10.0), "look like V: .* V / 10"),
+    "volts about zero": (times("openings", 10.0), r"look like V: .*COLUMN\*0\.1"),
     "converter's numbers": (times("openings", 32767.0), "look like numbers of a converter"),
     "force in mN": (times("forces", 1.0, 4000.0), "force is too large in 3000 rows .*force_range of 300 N"),
     "long gap": (without(slice(1000, 1500)), "row 1000: 501 ms after the row before.*10 % are missing"),

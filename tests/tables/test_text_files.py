@@ -235,6 +235,13 @@ def test_what_a_user_cannot_say(names: str, words: str, tmp_path: Path) -> None:
         columns("reference", file, COURSE, ("time", "x", "y"))
 
 
+def test_a_hand_in_volts_has_a_factor_and_an_offset(tmp_path: Path) -> None:
+    (tmp_path / "hand.csv").write_text("time,a [V],b\n0,2.5,1\n1,5,2\n")
+    file = table_file(f"{tmp_path}/hand.csv:Fx=a*20-50,Fy=b * -1e1")
+    assert file is not None
+    np.testing.assert_allclose(columns("user_force", file, FORCE, tuple(FORCE)), [[0, 0, -10], [1, 50, -20]])
+
+
 def test_columns_of_others_and_a_pipe_are_no_news(tmp_path: Path) -> None:
     (tmp_path / "own.csv").write_text("stiffness,time,x,y\n1000,0,0.5,0\n2000,1,0.5,0\n")
     with warnings.catch_warnings():

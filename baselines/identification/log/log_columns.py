@@ -12,7 +12,7 @@ from baselines.logs.table import read_table
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import in_line
 from birthsim_env.tables.headings import is_like_force
-from birthsim_env.tables.selection import NOTHING, Selection, clock_note, mapping_of
+from birthsim_env.tables.selection import NOTHING, Mapped, Selection, clock_note, mapping_of
 from birthsim_env.tables.table import Reading, Table
 
 CHAMBERS = ("P1", "N1", "P2", "N2")
@@ -67,8 +67,8 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
     """
     counted = any(name in options.columns for name in PISTONS)
     mapping = mapping_of("--columns ", options.columns, list(COUNTED if counted else UNITS)) if options.columns else {}
-    for name, column in mapping.items():
-        if column == NOTHING and name not in FORCES:
+    for name, asked in mapping.items():
+        if asked.column == NOTHING and name not in FORCES:
             raise ValueError(f"--columns {name}={NOTHING}; allowed: a column, and {NOTHING} for {', '.join(FORCES)} only")
     table = headed_table(path, options, mapping, NEEDED)
     pairs = {name: [f"{name}_{axis}" for axis in "xy"] for name in RECORDED}
@@ -94,9 +94,10 @@ def read_columns(path: Path, options: LogOptions) -> tuple[str, dict[str, Array]
     return table.source, found | dict(zip(FORCES, forces, strict=True))
 
 
-def headed_table(path: Path, options: LogOptions, mapping: Mapping[str, str], needed: Iterable[str]) -> Table:
+def headed_table(path: Path, options: LogOptions, mapping: Mapping[str, Mapped], needed: Iterable[str]) -> Table:
     """The table of a log; ``ValueError`` for one without a heading."""
-    table = read_table(path, Reading(options.skip, options.decimal_comma, frozenset(mapping.values()), has_options=True))
+    named = frozenset(one.column for one in mapping.values())
+    table = read_table(path, Reading(options.skip, options.decimal_comma, named, has_options=True))
     if not table.headed:
         raise ValueError(f"{table.source} has no heading; allowed: a line that names {', '.join(needed)}, then numbers")
     return table
@@ -112,11 +113,11 @@ def check_counts(chosen: Selection, times: Array) -> None:
         )
 
 
-def _forces(chosen: Selection, mapping: dict[str, str], recorded: Iterable[str]) -> tuple[Array, str]:
+def _forces(chosen: Selection, mapping: dict[str, Mapped], recorded: Iterable[str]) -> tuple[Array, str]:
     """The force of the hand (2, T), and what there is to say where no column is one."""
     none = np.zeros(chosen.table.rows)
     if any(name in chosen.used or name in mapping for name in FORCES):
-        chosen.check(name for name in FORCES if mapping.get(name) != NOTHING)
+        chosen.check(name for name in FORCES if mapping.get(name) != Mapped(NOTHING))
         return np.array([chosen.values(name) if name in chosen.used else none for name in FORCES]), ""
     if recorded:
         axes = [[chosen.values(one) for one in recorded if one.endswith(axis)] for axis in ("_x", "_y")]

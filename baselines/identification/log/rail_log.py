@@ -11,7 +11,7 @@ from baselines.identification.log.trial import Trial
 from baselines.logs.log import Column
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.tables.selection import NOTHING, Selection, clock_note, mapping_of
+from birthsim_env.tables.selection import NOTHING, SCALED, Mapped, Selection, clock_note, mapping_of
 
 VALVES, CELLS = ("openings_P", "openings_N"), ("pressures_P", "pressures_N")
 
@@ -31,7 +31,8 @@ UNITS = {name: column.unit for name, column in RAIL_COLUMNS.items()} | {ONE_VALV
 
 NEEDS = (
     f"one cylinder's log has time, position (m from mid stroke), {' and '.join(VALVES)} or {ONE_VALVE} of one 5/3 valve, "
-    f"{' and '.join(CELLS)}, and force where a hand pushes; --columns NAME=COLUMN,... for other names"
+    f"{' and '.join(CELLS)}, and force where a hand pushes; --columns NAME=COLUMN,... for other names, and "
+    f"NAME={SCALED} for volts: {ONE_VALVE}=u*0.2-1 where 5 V is shut and 10 V fully open"
 )
 
 FURTHER_OUT = 0.02
@@ -51,7 +52,7 @@ def read_rail(path: Path, options: LogOptions, rig: Parameters) -> tuple[str, Tr
     for k, name in enumerate(VALVES):
         openings[2 + k] = (1 - 2 * k) * chosen.values(ONE_VALVE) if one_valve else chosen.values(name)
     pressures[2:] = [chosen.values(name) for name in CELLS]
-    measured = "force" in chosen.used and mapping.get("force") != NOTHING
+    measured = "force" in chosen.used and mapping.get("force") != Mapped(NOTHING)
     force = chosen.values("force") if measured else np.zeros(len(times))
     _check_zero(table.source, position, rig)
     note = "" if measured else f"{table.source} has no force; it is taken as 0, as where nobody touches the rig"
@@ -91,7 +92,7 @@ def _check_zero(source: str, position: Array, rig: Parameters) -> None:
     if furthest > half + FURTHER_OUT:
         low, high = float(known.min()), float(known.max())
         unit = high - low > 10 * rig.cylinder2.stroke
-        like = "like mm" if unit else "as if they were counted from an end of the stroke: take half of it off"
+        like = "like mm" if unit else f"as if they were counted from an end of the stroke: --columns position=COLUMN*1-{half:g}"
         raise ValueError(
             f"{source} has positions of {low:.4g} to {high:.4g}; they look {like}; allowed: m from mid stroke, within "
             f"+-{half:g}, half of cylinder2.stroke (--parameters)"

@@ -51,7 +51,7 @@ def check_openings(source: str, openings: Array) -> None:
     lengths = np.concatenate([np.diff(runs(row), axis=0)[0] for row in beyond])
     if share > MOST or (share > TYPICAL / 2 and np.median(lengths) > LASTING):
         most = float(np.quantile(sizes, 1 - TYPICAL))
-        volts = "V: an opening is (V - 5) / 5 where 5 V is shut, V / 10 where 0 V is"
+        volts = "V: --columns NAME=COLUMN*0.2-1 where 5 V is shut and 10 V is open, COLUMN*0.1 where 0 V is shut"
         like = volts if most <= 10.5 else "percent: an opening is percent / 100" if most <= 101 else "numbers of a converter"
         raise ValueError(f"{source} has openings up to {most:.4g}; allowed: -1 to 1, 0 is shut; they look like {like}")
 
