@@ -8,7 +8,7 @@ import numpy as np
 from agents.residual.pistons import ObservedPistons
 from baselines.admittance import estimator
 from baselines.admittance.controller import AdmittanceController
-from baselines.admittance.rows import Estimate, EstimatorParameters, Memory
+from baselines.admittance.rows import Estimate, EstimatorParameters
 from baselines.staged import ControllerStage
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference, compliance
@@ -50,14 +50,14 @@ class Constants(EstimatorParameters):
 @kernel
 def _estimate(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     signals, estimate, p = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n]), constants.model.rig
-    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
+    own, bank = estimator.parts(block(memory, int(constants.rows_of_memory))[:, :n], constants)
     for i in range(n):
         for valve in range(4):
             own.chambers.opening[valve, i] = signals.opening[valve, i]
         for k in range(Reference.size):
             signals.asked.rows[k, i] = signals.reference.rows[k, i]
         signals.damping_factor[i] = 0.0
-    missed = estimator.estimate(signals, own, estimate, constants)
+    missed = estimator.estimate(signals, own, bank, estimate, constants)
     found, told = (
         ObservedPistons(signals.intermediate[: ObservedPistons.size]),
         EstimatorFeatures(signals.intermediate[ObservedPistons.size : ObservedPistons.size + EstimatorFeatures.size]),

@@ -17,7 +17,7 @@ from baselines.admittance import estimator, law
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, checked_gains, require_stiffness
-from baselines.estimation import inertial
+from baselines.estimation import friction_observer, inertial
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.hand import friction_candidates
 from baselines.impedance import Impedance, mass_spring_damper
@@ -99,7 +99,8 @@ class AdmittanceController(StagedController):
         force_sensor: whether the hand's force is measured.
         learn: whether it learns the tracker's noise and, with a force sensor, that sensor's bias and the friction of sliding
             pistons, which nothing else separates from the hand, and yields faster to large oscillations. From samples and a
-            force it also learns that the rig is lighter than believed (``inertia``). Only then does it read an acceleration
+            force it also learns that the rig is lighter than believed (``inertia``) and weighs ten frictions
+            (``friction_observer``), which it goes by while the target rests. Only then does it read an acceleration
             sensor, where positions are samples and the rig as believed has one; such a loop needs no mass.
         identified: without a force sensor: whether the friction believed is the rig's to 5 %, as after ``birthsim identify``.
             Then a resting hand is found by the bristles and the head rests quietly; with half that friction it wanders by
@@ -137,6 +138,7 @@ class AdmittanceController(StagedController):
         "ideal": IDEAL,
         "lab": LAB,
         "lab, learning": {**LAB, "rest_gain": 45.0},
+        "lab, weighing": {**LAB, "rest_gain": 36.0, "rest_push": 1.0, "dead_zone": 0.0},
         "inertial": {**IDEAL, "rest_gain": 45.0, "pressure_bandwidth": 30.0},
     }
 
@@ -157,7 +159,7 @@ class AdmittanceController(StagedController):
         super().__init__(parameters)
         self.reads_force = self._force_sensor = bool(force_sensor)
         self._learn, self._identified = bool(learn), bool(identified)
-        self._own, self._candidates = gains, 0
+        self._own, self._candidates, self._rows_of_bank = gains, 0, 0
 
     @property
     def gain_fraction(self) -> Array:
@@ -171,10 +173,10 @@ class AdmittanceController(StagedController):
 
         1 where it is ``identified``, or where nothing weighs it: that takes an acceleration sensor, a controller that learns
         without a force sensor, and positions that are samples."""
-        memory = Memory(self._memories[-1])
+        memory = self._memories[-1]
         if not self._candidates:
-            return np.ones((2, memory.rows.shape[1]))
-        found: Array = friction_candidates.chances(memory.pistons.past)[friction_candidates.LUGRE]
+            return np.ones((2, memory.shape[1]))
+        found: Array = friction_candidates.chances(memory[-self._rows_of_bank :])[friction_candidates.LUGRE]
         return found
 
     def remarks(self) -> list[str]:
@@ -197,9 +199,10 @@ class AdmittanceController(StagedController):
         fixed = self._force_sensor and not self._learn
         inert = sampled and self._learn and board.acceleration_bandwidth > 0
         sampled, weighed = sampled and not inert, inert and not self._force_sensor
-        kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
+        weighs, learning = sampled and learns_force, "lab, weighing" if learns_force else "lab, learning"
+        kind = "inertial" if inert else "ideal" if not sampled else learning if self._learn else "lab"
         tuned, least, falls = self.TUNED[kind], LEAST_FRACTION, 1.0
-        if sampled and learns_force:
+        if weighs:
             lighter = math.sqrt(min(1.0, HEAVY / rig.mechanics.mass))
             tuned, least, falls = {**tuned, "rest_gain": lighter * tuned["rest_gain"]}, SAMPLED_LEAST, MOST_FALLS
         g = {**tuned, **self._own}
@@ -207,7 +210,15 @@ class AdmittanceController(StagedController):
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
         follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
         self._candidates = (1 if self._identified else friction_candidates.CANDIDATES) if weighed else 0
-        fresh = estimator.fresh_memory(rig, sampled, self._candidates)
+        bank = (
+            friction_candidates.fresh_bank(self._candidates)
+            if weighed
+            else friction_observer.fresh_bank()
+            if weighs
+            else np.empty(0)
+        )
+        self._rows_of_bank = len(bank)
+        fresh = np.concatenate([estimator.fresh_memory(rig, sampled), bank])
         parameters = estimator.estimator_parameters(
             rig,
             sampled,
@@ -218,10 +229,12 @@ class AdmittanceController(StagedController):
             place=INTERMEDIATE if inert else POSITION,
             friction_rate=g["friction_rate"] if learns_force else 0.0,
             identified=self._identified,
-            learns_mass=sampled and learns_force,
+            learns_mass=weighs,
+            weighs_friction=weighs,
             feels_stiff_hand=learns_force,
             weighed=weighed,
             rows_of_memory=len(fresh),
+            rows_of_bank=len(bank),
             believed_limit=estimator.BELIEVED_LIMIT if inert or fixed else estimator.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )

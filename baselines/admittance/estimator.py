@@ -5,6 +5,7 @@
 - admittance.update_motion: the motion that the hand should find;
 - predict: spools, pressures and the friction along that motion;
 - correct: positions and speeds of the pistons, and what accelerates them without being known;
+- rest: both from candidates for the friction, where these are weighed, while the target rests;
 - adapt: the level of friction from what is left unexplained, and without a force sensor the hand's force.
 """
 
@@ -18,6 +19,7 @@ from baselines.estimation import (
     chamber_observer,
     disturbance_observer,
     friction_level,
+    friction_observer,
     inertia,
     observers,
     reference_friction,
@@ -26,11 +28,10 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.hand import bristle_observer, force_bias, force_observer, friction_candidates, inertial_force
+from baselines.estimation.hand import bristle_observer, force_bias, force_observer, inertial_force
 from baselines.estimation.hand.friction_candidates import Bank
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
-from baselines.estimation.rows import Pistons
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Point
 from birthsim_env.physics.compiled import exact
@@ -46,6 +47,9 @@ Below the second are 7 kg on a small bore and, unseen without a force sensor, th
 HEAVIER, MORE_DAMPED = 10.0, 2.0
 """1: what multiplies mass and damping ratio of the motion that a stiff hand finds while it is answered; found by trial. The
 damping in N s/m grows by the root of the first besides."""
+
+ARRIVAL_TIME = 0.1
+"""s; assumed: in which candidates for the friction take over once the target has come to rest."""
 
 
 @helper
@@ -95,13 +99,17 @@ def predict(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimator
 
 
 @helper
-def correct(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+def correct(seen: Seen, memory: Memory, bank: Bank, estimate: Estimate, constants: EstimatorParameters) -> None:
     """The pistons, and what accelerates them unseen."""
     joints, pistons = memory.joints, memory.pistons
     inputs, assumed = estimate.inputs, constants.model
     lanes, place, p = memory.fresh.shape[0], int(constants.place), assumed.rig
     if constants.sampled > 0.0:
-        observers.observe(pistons, seen, memory.chambers.pressure, inputs, assumed)
+        pressures = memory.chambers.pressure
+        observers.observe(pistons, seen, pressures, inputs, assumed)
+        if constants.weighs_friction > 0.0:
+            levels, fresh = memory.friction.level, memory.fresh
+            friction_observer.observe(bank, seen, joints, pressures, levels, inputs, assumed, estimate.found, fresh)
         for k in range(2):
             for i in range(lanes):
                 joints.position[k, i], joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
@@ -130,7 +138,23 @@ def correct(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimator
 
 
 @helper
-def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+def rest(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> None:
+    """Pistons of a target that rests, as candidates for their friction have them; those of one that moves stay as they are."""
+    joints, found, most = memory.joints, estimate.found, constants.believed_limit
+    kept = exact.exp(-constants.model.period / ARRIVAL_TIME)
+    for i in range(memory.fresh.shape[0]):
+        going = admittance.goes(seen.asked.velocity[0, i], seen.asked.velocity[1, i])
+        memory.travels[i] = max(going, kept * memory.travels[i])
+        resting = 1.0 - memory.travels[i]
+        for k in range(2):
+            unseen = max(-most, min(most, found.unseen[k, i]))
+            joints.position[k, i] += resting * (found.position[k, i] - joints.position[k, i])
+            joints.speed[k, i] += resting * (found.speed[k, i] - joints.speed[k, i])
+            estimate.unseen[k, i] += resting * (unseen - estimate.unseen[k, i])
+
+
+@helper
+def adapt(seen: Seen, memory: Memory, bank: Bank, estimate: Estimate, constants: EstimatorParameters) -> None:
     """The level of friction and, without a force sensor, the hand's force, for the next period."""
     fresh, assumed, joints, pressures = memory.fresh, constants.model, memory.joints, memory.chambers.pressure
     noise, hand, contact = estimate.inputs.noise, memory.hand, memory.contact
@@ -141,10 +165,7 @@ def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorPa
     if constants.weighed > 0.0:
         place = int(constants.place)
         moving = Moving(seen.rows[place : place + Moving.size])
-        bank = Bank(memory.pistons.past)
-        inertial_force.observe(
-            hand, contact, memory.rest_detector, bank, seen, moving, joints, pressures, noise, assumed, fresh
-        )
+        inertial_force.observe(hand, memory.rest_detector, bank, seen, moving, joints, pressures, noise, assumed, fresh)
     elif constants.identified > 0.0:
         bristle_observer.observe(hand, contact, seen, joints, pressures, noise, assumed, fresh)
     elif constants.force_sensor == 0.0:
@@ -152,8 +173,8 @@ def adapt(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorPa
 
 
 @helper
-def estimate(seen: Seen, memory: Memory, estimate: Estimate, constants: EstimatorParameters) -> int:
-    """Carries ``memory`` on by one control period and writes ``estimate``, over the lanes of a block.
+def estimate(seen: Seen, memory: Memory, bank: Bank, estimate: Estimate, constants: EstimatorParameters) -> int:
+    """Carries ``memory`` and ``bank`` on by one control period and writes ``estimate``, over the lanes of a block.
 
     Returns how many stiffness setpoints are not positive definite.
     """
@@ -170,20 +191,25 @@ def estimate(seen: Seen, memory: Memory, estimate: Estimate, constants: Estimato
     )
     admittance.mark_moving(estimate.motion, estimate.inputs.moving)
     predict(seen, memory, estimate, constants)
-    correct(seen, memory, estimate, constants)
-    adapt(seen, memory, estimate, constants)
+    correct(seen, memory, bank, estimate, constants)
+    if constants.weighs_friction > 0.0:
+        rest(seen, memory, estimate, constants)
+    adapt(seen, memory, bank, estimate, constants)
     for i in range(memory.fresh.shape[0]):
         memory.fresh[i] = 0.0
     return missed
 
 
-def fresh_memory(rig: Parameters, sampled: bool, candidates: int = 0) -> Array:
-    """``Memory`` of a lane that starts, with so many candidates for the friction where an acceleration sensor weighs them.
+@helper
+def parts(whole: Array, constants: EstimatorParameters) -> tuple[Memory, Bank]:
+    """What a block of rows holds: the memory, and the bank of candidates for the friction, which may have no rows."""
+    rows = whole.shape[0] - int(constants.rows_of_bank)
+    return Memory(whole[:rows]), Bank(whole[rows:])
 
-    Their bank stands in the place of past positions, which only an observer of samples remembers."""
+
+def fresh_memory(rig: Parameters, sampled: bool) -> Array:
+    """``Memory`` of a lane that starts."""
     whole, pistons = OscillationDetector.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
-    if candidates:
-        pistons = Pistons.lane(fresh=1.0, past=friction_candidates.fresh_bank(candidates))
     follower = Follower.lane(across=whole, along=whole, rest_across=whole, rest_along=whole)
     mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
     return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
@@ -205,6 +231,7 @@ def estimator_parameters(
         "force_sensor": True,
         "learns_noise": False,
         "rows_of_memory": len(fresh_memory(rig, sampled)),
+        "rows_of_bank": 0,
         "trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period),
         "friction_fraction": gains["friction_fraction"],
         "friction_rate": 0.0,
@@ -213,6 +240,7 @@ def estimator_parameters(
         "identified": False,
         "learns_mass": False,
         "feels_stiff_hand": False,
+        "weighs_friction": False,
         "believed_limit": BELIEVED_LIMIT,
         **others,
     }

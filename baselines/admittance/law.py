@@ -169,8 +169,8 @@ def command(seen: Seen, memory: Memory, estimate: Estimate, gains: Gains, assume
 def control(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are not positive definite."""
     signals, estimate = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n])
-    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
-    missed = estimator.estimate(signals, own, estimate, constants)
+    own, bank = estimator.parts(block(memory, int(constants.rows_of_memory))[:, :n], constants)
+    missed = estimator.estimate(signals, own, bank, estimate, constants)
     command(signals, own, estimate, constants.gains, constants.model)
     load(signals.opening, 0, n, own.chambers.opening)
     return missed

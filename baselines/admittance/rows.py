@@ -3,6 +3,7 @@
 from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.friction_observer import Found
 from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.force_observer import Hand
 from baselines.estimation.hand.half_wave import HalfWave
@@ -44,6 +45,7 @@ class Memory(Rows):
     bias = rows("bias_x bias_y", "N", "bias of the force sensor")
     friction = part(Friction, "level of friction")
     inertia = part(Inertia, "mass")
+    travels = row("1", "how far the target was moving of late, 0 to 1")
     hand = part(Hand, "force of the hand without a sensor")
     contact = part(ContactForce, "the same where friction is known")
     rest_detector = part(RestDetector, "whether the head rests, without a force sensor")
@@ -59,6 +61,7 @@ class Estimate(Rows):
     inputs = part(Inputs, "to the observer of the pistons")
     unseen = rows("U1 U2", "N", "all that is unseen along the pistons: friction as believed and what is observed besides")
     drag = rows("drag1 drag2", "N", "friction along the motion, as believed of the rig")
+    found = part(Found, "pistons as candidates for their friction have them")
     unexplained = rows("R1 R2", "N", "what pressures, weight, motion and measured force leave unexplained along the pistons")
     hand = rows("Fx Fy", "N", "force of the hand, measured or found")
     heavier = row("1", "what multiplies the mass that the hand should find")
@@ -77,10 +80,12 @@ class EstimatorParameters(Numbers):
     believed_limit = number("N", "that is believed to act unseen on a piston, at most")
     learns_noise = number("1", "1 where the tracker's noise is learned")
     place = number("1", "row of ``Seen`` at which a ``Point`` stands")
-    rows_of_memory = number("1", "rows of the memory")
+    rows_of_memory = number("1", "rows of the memory and of the bank of candidates after it")
+    rows_of_bank = number("1", "rows of that bank; 0 without one")
     trust = number("1", "trust in a pressure cell, 0 to 1")
     friction_fraction = number("1", "fraction of the believed friction that is fed forward")
     learns_mass = number("1", "1 where the mass is learned")
+    weighs_friction = number("1", "1 where candidates for the friction are weighed, which a head at rest is followed by")
     friction_rate = number("1/s", "rate at which the level of friction is learned; 0 learns nothing")
     feels_stiff_hand = number("1", "1 where a stiff hand that makes the head swing is answered")
     most_bias = number("N", "largest bias of the force sensor that is taken off; 0 takes nothing")

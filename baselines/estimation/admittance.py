@@ -119,11 +119,16 @@ def update_motion(
 
 
 @helper
+def goes(vx: float, vy: float) -> float:
+    """1 at a velocity, m/s, above ``MOVING_SPEED``, else 0."""
+    return 1.0 if vx * vx + vy * vy > MOVING_SPEED * MOVING_SPEED else 0.0
+
+
+@helper
 def mark_moving(motion: Motion, moving: Array) -> None:
     """``moving`` (N,) gets 1 where the velocity of ``motion``, m/s, is above ``MOVING_SPEED``, else 0."""
     for i in range(moving.shape[0]):
-        vx, vy = motion.velocity[0, i], motion.velocity[1, i]
-        moving[i] = 1.0 if vx * vx + vy * vy > MOVING_SPEED * MOVING_SPEED else 0.0
+        moving[i] = goes(motion.velocity[0, i], motion.velocity[1, i])
 
 
 @helper

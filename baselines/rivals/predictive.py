@@ -113,9 +113,9 @@ def control(world: int, seen: Seen, memory: int, constants: Constants, tables: i
     """One control period of a block; returns how many stiffness setpoints are not positive definite."""
     whole = block(memory, SIZE + int(constants.rows_of_memory))
     signals, estimate = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n])
-    plan, own = whole[:SIZE], Memory(whole[SIZE:, :n])
+    plan, (own, bank) = whole[:SIZE], estimator.parts(whole[SIZE:, :n], constants)
     inputs, low, high = HorizonInputs(scratch(HorizonInputs.size)[:, :n]), scratch(FLOWS)[:, :n], scratch(FLOWS)[:, :n]
-    missed = estimator.estimate(signals, own, estimate, constants)
+    missed = estimator.estimate(signals, own, bank, estimate, constants)
     predict_horizon(signals, own, estimate, constants, inputs)
     flow_ranges(inputs.pressure, own.chambers.spool, constants.model.rig, low, high, inputs.flow)
     improve(plan, inputs, low, high, constants, n)

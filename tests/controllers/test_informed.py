@@ -40,9 +40,9 @@ either = pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
 @kernel
 def inform(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """Hands on what is ``Estimate``."""
-    own = Memory(block(memory, int(constants.rows_of_memory))[:, :n])
+    own, bank = estimator.parts(block(memory, int(constants.rows_of_memory))[:, :n], constants)
     signals = Seen(seen.rows[:, :n])
-    return estimator.estimate(signals, own, Estimate(signals.intermediate[: Estimate.size]), constants)
+    return estimator.estimate(signals, own, bank, Estimate(signals.intermediate[: Estimate.size]), constants)
 
 
 class Aware(StagedController):

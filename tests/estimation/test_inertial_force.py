@@ -5,7 +5,6 @@ import pytest
 
 from baselines.estimation import observers
 from baselines.estimation.hand import friction_candidates, held_force, inertial_force
-from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
 from baselines.estimation.hand.friction_candidates import Bank
 from baselines.estimation.hand.held_force import RestDetector
@@ -36,7 +35,7 @@ class Observed:
     positions arrive. Its clock begins at ``time``, s."""
 
     def __init__(self, rig, time=0.0):
-        self.hand, self.contact, self.hold = (kind(np.zeros((kind.size, 1))) for kind in (Hand, ContactForce, RestDetector))
+        self.hand, self.hold = (kind(np.zeros((kind.size, 1))) for kind in (Hand, RestDetector))
         self.bank = Bank(friction_candidates.fresh_bank(1)[:, None])
         self.seen, self.moving, self.joints = (kind(np.zeros((kind.size, 1))) for kind in (Seen, Moving, Joints))
         self.assumed, self.fresh, self.seen.time[:] = AssumedParameters(observers.assumed_parameters(rig)), np.ones(1), time
@@ -45,7 +44,6 @@ class Observed:
         self.joints.position[:, 0], self.joints.speed[:, 0], self.moving.acceleration[:, 0] = y, speed, acceleration
         inertial_force.observe(
             self.hand,
-            self.contact,
             self.hold,
             self.bank,
             self.seen,

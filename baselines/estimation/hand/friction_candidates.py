@@ -63,6 +63,7 @@ class Bank(Rows):
     """All candidates."""
 
     since = row("s", "since the start")
+    newest = row("s", "time of the newest sample")
     sums = part(CumulativeSums, "test of the mean innovations")
     candidates = rows(0, "1", "``Candidate`` after ``Candidate``")
 

@@ -13,7 +13,6 @@ import math
 from baselines.estimation import dry_friction
 from baselines.estimation.hand import force_bias, friction_candidates, held_force
 from baselines.estimation.hand.bristle_filter import SLIDES
-from baselines.estimation.hand.bristle_observer import ContactForce
 from baselines.estimation.hand.bristled_pistons import LATE, loads
 from baselines.estimation.hand.force_observer import MOST_BIAS, Hand
 from baselines.estimation.hand.friction_candidates import Bank
@@ -47,7 +46,6 @@ are not seen, a third of what the filter believes. Found by trial; with 0 bristl
 @helper
 def observe(
     hand: Hand,
-    contact: ContactForce,
     detector: RestDetector,
     bank: Bank,
     seen: Signals,
@@ -58,7 +56,7 @@ def observe(
     assumed: AssumedParameters,
     fresh: Array,
 ) -> None:
-    """Carries ``hand``, ``contact``, ``detector`` and ``bank`` on by one period.
+    """Carries ``hand``, ``detector`` and ``bank`` on by one period.
 
     ``bank`` has the candidates for friction, ``moving`` is the end effector, ``pressures`` (4, N), Pa, the chambers', ``noise``
     (N,), m, that of a position sample.
@@ -72,8 +70,8 @@ def observe(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         _, _, _, _, _, kappa, sine, cosine = pose
-        is_sampled, new = seen.position_time[i] > contact.newest[i], fresh[i] > 0.0
-        contact.newest[i] = seen.position_time[i]
+        is_sampled, new = seen.position_time[i] > bank.newest[i], fresh[i] > 0.0
+        bank.newest[i] = seen.position_time[i]
         age = seen.time[i] - seen.position_time[i]
         load1, load2, own1, own2 = loads(i, joints, air, pose, p)
         ax, ay = moving.acceleration[0, i], moving.acceleration[1, i] + p.gravity
