@@ -210,15 +210,9 @@ class AdmittanceController(StagedController):
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
         follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
         self._candidates = (1 if self._identified else friction_candidates.CANDIDATES) if weighed else 0
-        bank = (
-            friction_candidates.fresh_bank(self._candidates)
-            if weighed
-            else friction_observer.fresh_bank()
-            if weighs
-            else np.empty(0)
-        )
-        self._rows_of_bank = len(bank)
-        fresh = np.concatenate([estimator.fresh_memory(rig, sampled), bank])
+        candidates = len(friction_observer.BRISTLES) if weighs else self._candidates
+        self._rows_of_bank = len(friction_candidates.fresh_bank(candidates))
+        fresh = estimator.fresh_memory(rig, sampled, candidates)
         parameters = estimator.estimator_parameters(
             rig,
             sampled,
@@ -234,7 +228,7 @@ class AdmittanceController(StagedController):
             feels_stiff_hand=learns_force,
             weighed=weighed,
             rows_of_memory=len(fresh),
-            rows_of_bank=len(bank),
+            rows_of_bank=self._rows_of_bank,
             believed_limit=estimator.BELIEVED_LIMIT if inert or fixed else estimator.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )

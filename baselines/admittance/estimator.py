@@ -13,6 +13,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from baselines.admittance.rows import Estimate, EstimatorParameters, Follower, Memory, OscillationDetector
 from baselines.estimation import (
     admittance,
@@ -28,7 +30,7 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.hand import bristle_observer, force_bias, force_observer, inertial_force
+from baselines.estimation.hand import bristle_observer, force_bias, force_observer, friction_candidates, inertial_force
 from baselines.estimation.hand.friction_candidates import Bank
 from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
@@ -202,17 +204,18 @@ def estimate(seen: Seen, memory: Memory, bank: Bank, estimate: Estimate, constan
 
 @helper
 def parts(whole: Array, constants: EstimatorParameters) -> tuple[Memory, Bank]:
-    """What a block of rows holds: the memory, and the bank of candidates for the friction, which may have no rows."""
+    """What a block of rows holds: the memory, and the bank of candidates for the friction, of which there may be none."""
     rows = whole.shape[0] - int(constants.rows_of_bank)
     return Memory(whole[:rows]), Bank(whole[rows:])
 
 
-def fresh_memory(rig: Parameters, sampled: bool) -> Array:
-    """``Memory`` of a lane that starts."""
+def fresh_memory(rig: Parameters, sampled: bool, candidates: int = 0) -> Array:
+    """``Memory`` of a lane that starts, and behind it its ``Bank`` with so many candidates for the friction."""
     whole, pistons = OscillationDetector.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
     follower = Follower.lane(across=whole, along=whole, rest_across=whole, rest_along=whole)
     mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
-    return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
+    memory = Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
+    return np.concatenate([memory, friction_candidates.fresh_bank(candidates)])
 
 
 def estimator_parameters(
@@ -231,7 +234,7 @@ def estimator_parameters(
         "force_sensor": True,
         "learns_noise": False,
         "rows_of_memory": len(fresh_memory(rig, sampled)),
-        "rows_of_bank": 0,
+        "rows_of_bank": len(friction_candidates.fresh_bank(0)),
         "trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period),
         "friction_fraction": gains["friction_fraction"],
         "friction_rate": 0.0,

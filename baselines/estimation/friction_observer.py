@@ -19,7 +19,7 @@ candidate expects, so that the others lose their weight for as long as that last
 import math
 
 from baselines.estimation import dry_friction
-from baselines.estimation.hand import bristle_filter, cumulative_sums, friction_candidates, maxwell_filter
+from baselines.estimation.hand import bristle_filter, cumulative_sums, maxwell_filter
 from baselines.estimation.hand.bristle_filter import HOLDS, LEAST_SPEED, YIELDS, Law
 from baselines.estimation.hand.bristled_pistons import LATE
 from baselines.estimation.hand.friction_candidates import Bank, candidate, likelihood
@@ -58,11 +58,6 @@ class Found(Joints):
     """Means of what the candidates say."""
 
     unseen = rows("U1 U2", "N", "all that is unseen along the pistons")
-
-
-def fresh_bank() -> Array:
-    """``Bank`` of a lane that starts."""
-    return friction_candidates.fresh_bank(len(BRISTLES))
 
 
 @helper

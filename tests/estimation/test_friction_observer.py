@@ -7,6 +7,7 @@ import pytest
 from baselines import make_controller
 from baselines.admittance.rows import Memory
 from baselines.estimation import friction_observer
+from baselines.estimation.hand import friction_candidates
 from baselines.estimation.hand.friction_candidates import Bank, Candidate
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.linkage.geometry import end_effector
@@ -20,9 +21,9 @@ STIFFNESS = "friction.bristle_stiffness"
 
 def candidates(law):
     """The candidates of a law's lanes."""
-    rows = len(friction_observer.fresh_bank())
-    bank = Bank(law._memories[-1][-rows:])
-    return [Candidate(one) for one in np.split(bank.candidates, len(friction_observer.BRISTLES))]
+    count = len(friction_observer.BRISTLES)
+    bank = Bank(law._memories[-1][-len(friction_candidates.fresh_bank(count)) :])
+    return [Candidate(one) for one in np.split(bank.candidates, count)]
 
 
 def driven(rig, hand, seconds, lanes=4, **gains):

@@ -115,7 +115,8 @@ def _yielding(bent: float, law: Law) -> tuple[float, float]:
 def _wear(speed: float, variance: float, bent: float, law: Law) -> tuple[float, float, float]:
     """Mean of alpha w(v), m/s, where ``speed`` is known with a ``variance``, m2/s2, of a normal distribution to a tenth; its
     derivative to ``speed``; and by how much the derivative of z' to -z/slack is larger, m/s, as alpha grows with z."""
-    fast = max(math.sqrt(speed * speed + 2.0 / math.pi * max(variance, 0.0)), law.creep)
+    # The root of the larger one, not the larger root: a slope at a root of 0 is not finite.
+    fast = math.sqrt(max(speed * speed + 2.0 / math.pi * max(variance, 0.0), law.creep * law.creep))
     share, grows = _yielding(bent, law)
     return share * fast, share * (speed / fast), grows * fast
 

@@ -13,6 +13,9 @@ from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import rows
 from birthsim_env.physics.seals.maxwell_slip import ELEMENTS, REACH, STIFFNESS
 
+LEAST_GRIP = 1e-3
+"""Less than any element has of the stiffness. Where none sticks nothing is divided by the grip, nor is a slope infinite."""
+
 
 class Elements(Bristled):
     """``Bristled`` with its elements."""
@@ -50,7 +53,7 @@ def predict(
     mean = 0.0
     for e in range(ELEMENTS):
         mean += STIFFNESS[e] * b.element[ELEMENTS * k + e, i]
-    shift = (b.bristle[k, i] - mean) / before if before > 0.0 else 0.0
+    shift = (b.bristle[k, i] - mean) / max(before, LEAST_GRIP) if before > 0.0 else 0.0
     slack, z = bristle_filter.slack_at(k, v, b.level[k, i], law, p), 0.0
     for e in range(ELEMENTS):
         row, most = ELEMENTS * k + e, REACH[e] * slack
@@ -70,7 +73,7 @@ def predict(
         b.element[row, i] = held
         z += STIFFNESS[e] * held
         grip += STIFFNESS[e] if held == moved else 0.0
-    kept = min(1.0, grip / before) if before > 0.0 else 1.0
+    kept = min(1.0, grip / max(before, LEAST_GRIP)) if before > 0.0 else 1.0
     bend = period * grip
     b.grip[k, i] = grip
     b.position[k, i] += period * v
