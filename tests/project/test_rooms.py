@@ -90,6 +90,7 @@ GIVEN = {
     "agents/residual/corrected.py": {"action[valve - 2 * first, i]"},
     "baselines/bench/metrics.py": {"command[0, i]", "command[1, i]"},
     "baselines/estimation/hand/bristle_filter.py": {"_yielding(_way(v) * z / slack, law)[0]"},
+    "baselines/estimation/friction_observer.py": {"start[0]", "start[1]"},
     "baselines/estimation/hand/bristled_pistons.py": {"pose[5]"},
     "baselines/estimation/stages.py": {"scratch(1)[0, :n]"},
     "birthsim_env/observation.py": {"scales[each * k + each - 1]", "pair[1]", "pair[0]"},
@@ -99,7 +100,7 @@ GIVEN = {
 }
 """Arguments that are one named group of whoever calls: x and y, or chambers P1, N1, P2, N2. In tracks.py: the supply's
 pressure and then those of the tubes' ends; flows from the supply and then those to the atmosphere, (8, N). In corrected.py and
-observation.py: entries of a rail, which begin with cylinder 2. pose and _yielding give tuples."""
+observation.py: entries of a rail, which begin with cylinder 2. pose, start and _yielding are tuples."""
 
 
 def test_kernels_name_their_rows():

@@ -8,7 +8,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
 from lab.engine import information
 from lab.engine.worlds import COUNT, SEED
-from lab.studies.friction_laws.study import ASSUMED, METRICS, ROWS, STUDY
+from lab.studies.friction_laws.study import ASSUMED, METRICS, ROWS, SENSORS, STUDY
 
 OPTIONS = SimpleNamespace(**{**STUDY.options, "friction": ("lugre", "coulomb", "gms"), "episodes": 2})
 
@@ -32,7 +32,7 @@ def test_plants_have_the_frictions_of_the_sweep_while_controllers_believe_the_de
 
 def test_the_paper_is_beside_rivals_and_both_kinds_of_force():
     assert {"backstepping", "pid", "time-delay", "disturbance-observer"} < {row.controller for row in ROWS}
-    assert {(row.rig, row.facts[-1]) for row in ROWS if row.controller.startswith("admittance")} == {
+    assert {(row.rig, row.facts(SENSORS)[-1]) for row in ROWS if row.controller.startswith("admittance")} == {
         (information.DEFAULT, "yes"), (information.TOLD, "no"),
     }  # fmt: skip
 
