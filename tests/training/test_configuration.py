@@ -9,6 +9,7 @@ import pytest
 import torch
 import yaml
 
+from agents.residual.corrected import action_names
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import (
     FOLDER,
@@ -45,7 +46,7 @@ def test_every_configuration_of_the_package_says_what_its_file_says_and_can_be_m
             assert key in content.get(table, {}) or settings.to_dict()[key] == value, "what is not said is the default"
     arguments = {"sensors": training.sensors, "randomize": training.randomize, **residual.to_dict()}
     env = gymnasium.make_vec(training.environment, num_envs=1, **arguments)
-    assert env.single_action_space.shape == (residual.size,)
+    assert env.single_action_space.shape == (len(action_names(residual, env.unwrapped.simulation.parameters)),)
     # Minibatches are whole parts of what is collected.
     assert "ppo" not in training.algorithm or training.lanes * training.rollout % training.batch == 0
     assert json.loads(json.dumps(training.to_dict())) == training.to_dict()
