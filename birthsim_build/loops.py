@@ -14,7 +14,7 @@ from birthsim_build.stages import enter_scenario, outside, pair_valves
 from birthsim_env.loop import pipeline
 from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, SEEN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
-from birthsim_env.loop.world import plant_stage
+from birthsim_env.loop.world import guide_stage, plant_stage
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -30,11 +30,17 @@ ORDER = tuple(name for step in pipeline.ORDER for name in _BUILT.get(step, (step
 """Parts in the order in which a control period runs them: that of an environment, with a person's inputs, on which a start on
 the page depends. The page alone has policy, start, rest (what its plant then remembers) and show."""
 
-CLOCK, INPUTS = (Part((Stage(one, memory=INPUT_MEMORY),), {}) for one in (enter_scenario, outside))
-"""The parts around those of a scenario."""
+CLOCK = Part((Stage(enter_scenario, memory=INPUT_MEMORY),), {})
+"""The part before those of a scenario, as ``inputs_part`` is behind them."""
 
 PAIRED_VALVES = Part((Stage(pair_valves, sees_world=False),), {})
 """The part ``valves`` of a rig with one 5/3 valve per cylinder; with two there is none."""
+
+
+def inputs_part(rig: Parameters) -> Part:
+    """What a person does, of whose force a rail bears what acts across it."""
+    guide = (guide_stage(),) if rig.linkage.is_rail else ()
+    return Part((Stage(outside, memory=INPUT_MEMORY), *guide), {})
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,7 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
     simulation = env.unwrapped.simulation
     groups = {name: simulation.pipeline.group(name) for name in pipeline.ORDER if name not in ("actuation", "outcome")}
     parts = {name: Part(tuple(stages), {}) for name, stages in groups.items() if stages}
-    parts |= {"clock": CLOCK, "inputs": INPUTS}
+    parts |= {"clock": CLOCK, "inputs": inputs_part(rig)}
     parts = {name: parts[name] for name in ORDER if name in parts}
     return World(np.concatenate(simulation.rows())[:, 0], parts, simulation.sensors.sampled)
 

@@ -11,7 +11,6 @@ from baselines.controller import RESIDUAL
 from birthsim.command_line.settings import CONTROL, MANY, Configured, RigFile, number, whole
 from birthsim.serving import need_server, serve
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.topology import refuse_rail
 from birthsim_env.physics.rig.values import shown
 from birthsim_live.logs.recording import load_recording
 from birthsim_live.rig.folder import Packed, offer, packed_page, write_page
@@ -50,20 +49,14 @@ def main(settings: Settings) -> None:
     if settings.replay is not None:
         _replay(settings, settings.replay)
     elif settings.static is not None:
-        size = write_page(settings.static, _packed(settings, _rig_of(settings)))
+        size = write_page(settings.static, _packed(settings, load_parameters(settings.parameters)))
         seen = f"python -m http.server -d {settings.static} shows it at http://127.0.0.1:8000"
         print(f"written to {settings.static}: {size / 1e6:.2f} MB; {seen}")
     else:
         need_server()
         with _listening(settings, 8000) as listening:
-            rig = _rig_of(settings)
+            rig = load_parameters(settings.parameters)
             serve(_packed(settings, rig), rig, listening, settings, "birthsim live")
-
-
-def _rig_of(settings: Settings) -> Parameters:
-    rig = load_parameters(settings.parameters)
-    refuse_rail(rig, "birthsim live")
-    return rig
 
 
 def _listening(settings: Settings, port: int) -> socket.socket:
@@ -99,5 +92,6 @@ def _replay(settings: Settings, file: Path) -> None:
         packed = packed_page(Parameters())
         # It draws the recording's rig; the one that it could run stands still and is not seen.
         hello = packed.content["hello"]
-        hello |= {**greeting(recording.rig, hello["choices"]["controller"]), "replay": file.name}
+        drawn = greeting(recording.rig, hello["choices"]["controller"])
+        hello |= {**drawn, "defaults": hello["defaults"], "replay": file.name}
         serve(packed, recording.rig, listening, settings, f"birthsim live --replay {file.name}, {recording.duration:.1f} s")

@@ -1,6 +1,8 @@
 // What each plot shows: title, unit, curves with the paper's symbols, and how small its range may become.
 // Dashes and luminance tell curves apart without colour.
 
+import { CHAMBERS } from "./frame.js";
+
 const CYLINDER = ["cylinder-1", "cylinder-2"];
 const DASHED = [7, 4];
 const DOTTED = [2, 3];
@@ -9,11 +11,12 @@ const BAR = 1e-5;
 
 /**
  * `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css; `only`
- * is the class of what belongs to one rig or to two, `unless` a curve that takes its place where that has numbers. A plot that
+ * is the class of what belongs to one rig or to two, `unless` a curve that takes its place where that has numbers, `cylinder` the
+ * one that it is of, counted from 0. A plot that
  * is `common` shows both rigs; the others show one, and the names of the second's curves begin with SECOND.
  */
-const curve = (name, symbol, colour, width, dash = [], { only = "", unless } = {}) => ({ name, symbol, colour, width, dash, only, unless });
-const setpoints = (names, colour) => names.map((name, i) => curve(name, i ? null : ["set"], colour, 1.5, DOTTED));
+const curve = (name, symbol, colour, width, dash = [], { only = "", unless, cylinder } = {}) => ({ name, symbol, colour, width, dash, only, unless, cylinder });
+const setpoints = (names, colour, of = () => ({})) => names.map((name, i) => curve(name, i ? null : ["set"], colour, 1.5, DOTTED, of(i)));
 
 const coordinate = (axis) => ({
   title: `position ${axis}`,
@@ -53,8 +56,8 @@ export const PLOTS = [
     unit: "bar abs.",
     least: 2,
     curves: [0, 1].flatMap((i) => [
-      curve(`P${i + 1}`, [["P", `p${i + 1}`]], CYLINDER[i], 1.8),
-      curve(`N${i + 1}`, [["P", `n${i + 1}`]], CYLINDER[i], 1.8, DASHED),
+      curve(`P${i + 1}`, [["P", `p${i + 1}`]], CYLINDER[i], 1.8, [], { cylinder: i }),
+      curve(`N${i + 1}`, [["P", `n${i + 1}`]], CYLINDER[i], 1.8, DASHED, { cylinder: i }),
     ]),
   },
   {
@@ -86,8 +89,8 @@ export const DEEPER = [
     least: 1000,
     zero: true,
     curves: [
-      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
-      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
+      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2, [], { cylinder: i - 1 })),
+      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink", (i) => ({ cylinder: i })),
     ],
   },
 ];
@@ -125,7 +128,7 @@ function rowOfOne(frame, rms) {
     row[`pneumatic_${i + 1}`] = frame.pneumatic[i];
     row[`pneumatic_setpoint_${i + 1}`] = frame.pneumatic_setpoint[i];
   });
-  ["P1", "N1", "P2", "N2"].forEach((name, i) => {
+  CHAMBERS.forEach((name, i) => {
     row[name] = BAR * frame.pressures[i];
   });
   return row;

@@ -5,6 +5,11 @@ export const FIELDS = {
   pointer: 2, pressures: 4, openings: 4, stiffness: 2, pneumatic: 2, pneumatic_setpoint: 2, friction: 2, flows: 4,
 };
 
+export const CHAMBERS = ["P1", "N1", "P2", "N2"];
+
+/** Which of CHAMBERS the cylinders have, that are counted from 0. */
+export const chambersOf = (cylinders) => cylinders.flatMap((one) => [2 * one, 2 * one + 1]);
+
 export const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
 export const LEAST_GIVEN = 1e-4;
 

@@ -1,9 +1,9 @@
-// One bar per chamber on the scale of the air's colours, from atmospheric to supply pressure.
+// One bar per chamber that there is, on the scale of the air's colours, from atmospheric to supply pressure.
 
+import { CHAMBERS, chambersOf } from "./frame.js";
 import * as pen from "./pen.js";
 import { Sheet } from "./sheet.js";
 
-const NAMES = ["P1", "N1", "P2", "N2"];
 const ROW = 17;
 const RATE = 15; // redraws per second: nobody sees more of a bar
 
@@ -13,8 +13,8 @@ export class Gauges {
     this.last = 0;
   }
 
-  setUp(air) {
-    this.air = air;
+  setUp({ air, cylinders }) {
+    Object.assign(this, { air, chambers: chambersOf(cylinders) });
   }
 
   step(pressures, now) {
@@ -32,7 +32,8 @@ export class Gauges {
     context.clearRect(0, 0, width, height);
     context.font = `600 12px ${pen.FONT}`;
     context.textBaseline = "middle";
-    pressures.forEach((pressure, i) => {
+    this.chambers.forEach((chamber, i) => {
+      const pressure = pressures[chamber];
       const share = (pressure - atmosphere) / (supply - atmosphere);
       const top = i * ROW;
       const length = Math.min(Math.max(share, 0), 1) * room;
@@ -46,11 +47,11 @@ export class Gauges {
       }
       context.fillStyle = pen.INK;
       context.textAlign = "left";
-      context.fillText(NAMES[i], 0, top + ROW / 2);
+      context.fillText(CHAMBERS[chamber], 0, top + ROW / 2);
       context.textAlign = "right";
       context.fillText(Number.isFinite(pressure) ? (pressure / 1e5).toFixed(2) : "–", width, top + ROW / 2);
     });
-    this.drawScale(left, room, 4 * ROW + 2);
+    this.drawScale(left, room, this.chambers.length * ROW + 2);
   }
 
   drawScale(left, room, top) {

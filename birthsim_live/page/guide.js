@@ -1,15 +1,17 @@
-// Things to try, one after the other: settings, two sentences, and where to look.
+// Things to try, one after the other: settings, two sentences, and where to look. Some say something else on a rail, or are not for one.
 
 const LESSONS = [
   {
     name: "Feel the friction",
     says: "Compressed air carries the head of a childbirth simulator, and a controller should make it feel like a spring. Pull it and hold: the controller pushes against friction, and it shakes by millimetres.",
+    onRail: "Compressed air moves the carriage of a bench, and a controller should make it feel like a spring. Pull it and hold: the controller pushes against friction, and the carriage shakes.",
     settings: {},
     look: ".lens",
   },
   {
     name: "Take the friction away",
     says: "It shakes more, by a centimetre: the pistons slide freely, but the controller still pushes against the friction that it expects. One that expected none would hold still; nobody knows friction exactly.",
+    linkageAlone: true,
     settings: { friction: 0 },
     look: "[data-figure=error]",
   },
@@ -58,12 +60,13 @@ export class Guide {
     document.getElementById("next").addEventListener("click", () => this.next());
   }
 
-  setUp({ choices, defaults }) {
+  setUp({ choices, defaults, guide }) {
+    this.rail = Boolean(guide);
     this.defaults = Object.fromEntries(BASE.map((name) => [name, defaults[name]]));
-    const known = choices.controller.filter(({ missing }) => !missing).map(({ name }) => name);
+    const open = (kind, name) => !name || choices[kind].some((one) => one.name === name && !one.missing);
     this.list.replaceChildren(...[...LESSONS, OWN].map(({ name }) => new Option(name)));
-    LESSONS.forEach(({ settings: { controller } }, k) => {
-      this.list.options[k].disabled = Boolean(controller) && !known.includes(controller);
+    LESSONS.forEach(({ settings: { controller, scenario }, linkageAlone }, k) => {
+      this.list.options[k].disabled = !open("controller", controller) || !open("scenario", scenario) || (this.rail && Boolean(linkageAlone));
     });
     this.list.options[LESSONS.length].disabled = true;
     this.lesson = null;
@@ -90,7 +93,7 @@ export class Guide {
     if (lesson === this.lesson) return;
     this.lesson = lesson;
     this.list.value = lesson.name;
-    this.words.textContent = lesson.says;
+    this.words.textContent = (this.rail && lesson.onRail) || lesson.says;
     document.querySelector(".look")?.classList.remove("look");
     document.querySelector(lesson.look)?.classList.add("look");
   }

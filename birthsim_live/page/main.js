@@ -97,11 +97,12 @@ const source = new Source({
     plots.show(recent);
     views.setUp(message);
     rigs.setUp(message);
+    plots.setUp(message);
     physics.setUp(message);
     explain(message.words.figures);
     about.setUp(message.words);
     byId("back").hidden = !source.player || Boolean(message.replay);
-    gauges.setUp(message.air);
+    gauges.setUp(message);
     transport.setUp(message);
     banner("offline", "");
     if (message.mode === "live") setUpSettings(message);

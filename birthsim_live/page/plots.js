@@ -54,6 +54,7 @@ class Plot {
     this.definition = definition;
     this.shown = shown;
     this.visible = true;
+    this.names = definition.curves.map(({ name }) => name);
     this.range = calmRange(definition.least, definition.zero);
     const figure = document.createElement("figure");
     figure.dataset.plot = definition.title;
@@ -91,6 +92,17 @@ class Plot {
     };
   }
 
+  /** Show what is of one of the `cylinders`, counted from 0, or of none of them. */
+  setUp(cylinders) {
+    this.definition.curves.forEach(({ name, cylinder }, k) => {
+      const show = cylinder === undefined || cylinders.includes(cylinder);
+      this.chart.setSeries(k + 1, { show });
+      const item = this.place.parentElement.querySelector(`[data-curve="${name}"]`);
+      if (item) item.hidden = !show;
+    });
+    this.names = this.definition.curves.filter((_, k) => this.chart.series[k + 1].show).map(({ name }) => name);
+  }
+
   get history() {
     return this.shown.history;
   }
@@ -108,9 +120,9 @@ class Plot {
   }
 
   valueRange() {
-    const { curves, follow } = this.definition;
+    const { follow } = this.definition;
     const first = Math.max(0, this.history.view("time").findIndex((time) => time >= this.timeRange()[0]));
-    const [low, high] = extremes((follow ?? curves.map(({ name }) => name)).map((name) => this.view(name)), first);
+    const [low, high] = extremes((follow ?? this.names).map((name) => this.view(name)), first);
     return this.range(low, follow ? 1.5 * high : high);
   }
 
@@ -178,6 +190,11 @@ export class Plots {
     this.due = 0;
     this.share = 1;
     this.last = performance.now();
+  }
+
+  /** A rail has no curves of cylinder 1. */
+  setUp({ cylinders }) {
+    for (const plot of this.plots) plot.setUp(cylinders);
   }
 
   /** Show the last seconds of a history, or, with a `duration`, s, all of it. */

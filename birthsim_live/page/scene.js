@@ -33,8 +33,8 @@ export class Scene {
     pen.onNightfall(() => this.layOut());
   }
 
-  setUp({ geometry, air, drag_limit: limit }) {
-    Object.assign(this, { geometry, air, limit });
+  setUp({ geometry, air, guide, drag_limit: limit }) {
+    Object.assign(this, { geometry, air, guide, limit });
     this.layOut();
   }
 
@@ -186,15 +186,16 @@ export class Scene {
     this.pen.disc(end, 5, pen.PAPER, pen.CAP, 2);
   }
 
-  /** A finger that pulls the head to the right, again and again; it rests where the person wants no motion. */
+  /** A finger that pulls the head to the right, or along a rail, again and again; it rests where the person wants no motion. */
   drawCue({ position }) {
     const part = STILL.matches ? 0.7 : (performance.now() % CUE_TIME) / CUE_TIME;
     const passed = Math.min(1, part / 0.7);
-    const length = Math.min(CUE_LENGTH * this.unit, this.roomAlong(this.pen.pixel(position), [1, 0]) - CUE_LENGTH / 3);
+    const [ux, uy] = this.guide ?? [1, 0];
+    const length = Math.min(CUE_LENGTH * this.unit, this.roomAlong(this.pen.pixel(position), [ux, -uy]) - CUE_LENGTH / 3);
     const ahead = (length * passed * passed * (3 - 2 * passed)) / this.pen.scale;
     const { context } = this.pen;
     const from = [position[0], position[1]];
-    const to = [position[0] + ahead, position[1]];
+    const to = [position[0] + ahead * ux, position[1] + ahead * uy];
     context.globalAlpha = part > 0.85 ? (1 - part) / 0.15 : 1;
     this.pen.line([from, to], pen.INK, 3);
     this.pen.disc(to, 11, pen.PAPER, pen.INK, 2.5);

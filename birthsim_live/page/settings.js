@@ -11,6 +11,9 @@ const GROUPS = {
   "Your hand": { drag_stiffness: ["spring to the pointer"] },
 };
 
+// On a rail: one stiffness along it, which is asked for along x and y, and no cylinder 1.
+const ON_RAIL = { ...GROUPS, "Rendered stiffness": { Kclx: ["along the rail ", ["K", "cl"]] }, "Pneumatic stiffness": { Kpneu2: [["K", "pneu"]] } };
+
 export class Settings {
   /** `change(settings)` asks the rig; what it answers comes back through `show`. */
   constructor(form, change) {
@@ -19,7 +22,7 @@ export class Settings {
     form.addEventListener("submit", (event) => event.preventDefault());
   }
 
-  setUp({ choices, ranges }) {
+  setUp({ choices, ranges, guide }) {
     this.form.replaceChildren();
     this.lists = {};
     this.fields = {};
@@ -30,13 +33,15 @@ export class Settings {
     this.about.id = "chosen";
     lists.append(this.about, this.ownHand());
     this.form.append(lists);
-    for (const [title, names] of Object.entries(GROUPS)) {
+    for (const [title, names] of Object.entries(guide ? ON_RAIL : GROUPS)) {
       const box = group(title);
       for (const name in names) {
-        this.fields[name] = new NumberField(name, names[name], ranges[name], (value) => this.change({ [name]: value }));
+        const others = guide && name === "Kclx" ? ["Kcly"] : [];
+        const changes = (value) => Object.fromEntries([name, ...others].map((one) => [one, value]));
+        this.fields[name] = new NumberField(name, names[name], ranges[name], (value) => this.change(changes(value)));
         box.append(this.fields[name].element);
       }
-      if ("Kpneu1" in names) box.append(this.giveBack());
+      if ("Kpneu2" in names) box.append(this.giveBack());
       this.form.append(box);
     }
   }
@@ -95,7 +100,7 @@ export class Settings {
     const own = settings.stiffness_source === "scenario";
     this.source.disabled = own;
     this.source.textContent = own ? "these are the scenario's setpoints" : "back to the scenario's setpoints";
-    for (const name of STIFFNESSES) this.fields[name].element.classList.toggle("given", own);
+    for (const name of STIFFNESSES) this.fields[name]?.element.classList.toggle("given", own);
     this.fields.damping.enable(settings.damping_applies, "this controller has no damping to set");
   }
 }

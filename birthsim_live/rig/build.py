@@ -3,7 +3,7 @@ policies, words or version. It needs the extras ``agents`` and ``build``; ``test
 
 from pathlib import Path
 
-from agents.policy.shipped import loadable_names
+from agents.policy.shipped import loadable_for
 from birthsim_build.building import write_wasm
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_env.physics.rig.parameters import Parameters
@@ -16,7 +16,8 @@ def build(folder: Path) -> None:
     """Write the code and data of the paper's rig into ``folder``, and those with which a controller learns."""
     require_llvm()
     require_linker()
-    packed = pack(Parameters(), loadable_names())
+    rig = Parameters()
+    packed = pack(rig, loadable_for(rig))
     (folder / "pack.json").write_text(compact({**packed.content, "index": packed.index}) + "\n", encoding="utf-8")
     packed.words.tofile(folder / "loop.bin")
     write_wasm(packed.content["functions"], folder / "loop.wasm")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.shipped import loadable_names
+from agents.policy.shipped import loadable_for
 from baselines.controller import RESIDUAL
 from baselines.named import make_controller
 from birthsim_build.faces.module import write_module
@@ -46,7 +46,7 @@ def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[s
         return built
     from birthsim_live.rig.pack import pack  # which takes a second to load
 
-    return pack(rig, loadable_names(), content["functions"], others)
+    return pack(rig, loadable_for(rig), content["functions"], others)
 
 
 def _lists_all(content: dict[str, Any]) -> bool:
@@ -62,7 +62,7 @@ def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -
     """
     choices, asked = content["hello"]["choices"], list(asked)
     known = {one["name"]: one for one in choices["controller"]}
-    listed = [*names("controller", listed=True), *(f"{RESIDUAL}:{name}" for name in loadable_names())]
+    listed = [*names("controller", listed=True), *(f"{RESIDUAL}:{name}" for name in loadable_for(rig))]
     for name in dict.fromkeys([*listed, *asked]):
         if name not in known:
             if name in asked:

@@ -13,6 +13,7 @@ from birthsim_build.layout import DRAG_LIMIT
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.scenarios import scenarios_for
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.topology import RAIL, TWO_CYLINDERS
 from birthsim_env.registry import names
 from birthsim_live.rig.words import CHOICES, described, words
 
@@ -21,6 +22,10 @@ NOTHING = "nothing"
 
 OPENS = "backstepping"
 """The controller that a visitor of the page meets: the paper's control law, whose error under a pull can be seen."""
+
+
+OPENS_WITH = {TWO_CYLINDERS: "probe", RAIL: "rail-stiffness"}
+"""Word of ``linkage.kind`` -> the scenario that a visitor meets, whose target rests: what moves is the visitor's doing."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,9 @@ class Slider:
 def sliders(rig: Parameters) -> dict[str, Slider]:
     """Name -> slider for a rig. All ranges are assumed: what the rig bears, and a little of what it does not."""
     mass = rig.mechanics.mass
+    along = "the rail" if rig.linkage.is_rail else "x"
     return {
-        "Kclx": Slider("Closed-loop stiffness along x", "Kclx", "N/m", 200.0, 8000.0, 2000.0, log=True),
+        "Kclx": Slider(f"Closed-loop stiffness along {along}", "Kclx", "N/m", 200.0, 8000.0, 2000.0, log=True),
         "Kcly": Slider("Closed-loop stiffness along y", "Kcly", "N/m", 200.0, 8000.0, 2000.0, log=True),
         "Kpneu1": Slider("Pneumatic stiffness of cylinder 1", "K1", "N/m", 2000.0, 6000.0, 4600.0, log=True),
         "Kpneu2": Slider("Pneumatic stiffness of cylinder 2", "K2", "N/m", 1000.0, 3000.0, 2300.0, log=True),
@@ -58,14 +64,15 @@ def default_settings(rig: Parameters) -> dict[str, Any]:
     ``stiffness_source`` says whether the setpoints are the scenario's or the sliders'.
     """
     words = {
-        "scenario": "probe", "controller": OPENS, "compare": NOTHING, "valves": "two_valves", "sensors": "ideal",
-        "scenario_force": False, "stiffness_source": "scenario",
+        "scenario": OPENS_WITH[rig.linkage.kind], "controller": OPENS, "compare": NOTHING, "valves": "two_valves",
+        "sensors": "ideal", "scenario_force": False, "stiffness_source": "scenario",
     }  # fmt: skip
     return {**words, **{name: slider.default for name, slider in sliders(rig).items()}}
 
 
 def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str, Any]:
-    """It, with the choices of ``controllers``."""
+    """It, with the choices of ``controllers``; ``cylinders`` are those that move, of 0 and 1; along a rail's ``guide``, a
+    direction, acts all that it leaves of a hand's force."""
     g, air = rig.geometry, rig.air
     named = {"scenario": scenarios_for(rig), "valves": VALVE_LAYOUTS, "sensors": names("sensors")}
     return {
@@ -80,10 +87,13 @@ def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str
             "pivot1": [g.d3 * math.cos(g.gamma3), g.d3 * math.sin(g.gamma3)],
             "pivot2": [0.0, 0.0],
             **{name: getattr(g, name) for name in ("d3", "d6", "k1", "k2", "gamma3")},
+            "first": rig.linkage.topology.cylinders[0],
             "half_stroke1": rig.cylinder1.stroke / 2,
             "half_stroke2": rig.cylinder2.stroke / 2,
             **shapes(rig),
         },
+        "cylinders": list(rig.linkage.topology.cylinders),
+        "guide": [math.cos(rig.linkage.inclination), math.sin(rig.linkage.inclination)] if rig.linkage.is_rail else None,
         "air": {"supply": air.supply_pressure, "atmosphere": air.atmospheric_pressure},
         "areas": [area for one in (rig.cylinder1, rig.cylinder2) for area in (one.area_p, one.area_n)],
         "drag_limit": DRAG_LIMIT,

@@ -15,7 +15,7 @@ from baselines.named import make_controller
 from baselines.staged import StagedController
 from birthsim_build.faces.module import Store
 from birthsim_build.image import INPUT_MEMORY, Part, function_name
-from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, is_compiled, staged_part
+from birthsim_build.loops import CLOCK, ORDER, PAIRED_VALVES, inputs_part, is_compiled, staged_part
 from birthsim_build.stages import Period, enter_sensors, leave_sensors
 from birthsim_env.info import Info
 from birthsim_env.loop.rows import ASKED, WORLD
@@ -28,13 +28,14 @@ from birthsim_env.parts.sensors.model import SensorModel
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.topology import RAIL
 from birthsim_env.physics.strength import require_carried
 from birthsim_env.registry import entry, names
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
 from birthsim_live.rig.folder import Packed
-from birthsim_live.rig.greeting import OPENS, greeting
+from birthsim_live.rig.greeting import OPENS, OPENS_WITH, greeting
 from birthsim_live.rig.words import LEARNING, controller_choice
 
 EPISODES = 16
@@ -82,7 +83,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     start, rest = start_stages(np.zeros((Start.size, 1)), column[:, 0], plant(tubes))
     laws = {name: law for name in chosen if is_compiled(law := _made(name, rig))}
     made: dict[str, dict[str, Any]] = {
-        "scenarios": {name: scenario(name) for name in scenarios_for(rig)},
+        "scenarios": {name: scenario(name, rig) for name in scenarios_for(rig)},
         "sensors": {name: sensors(name, rig) for name in names("sensors")},
         "controllers": {name: controller_parts(law) for name, law in laws.items()},
     }
@@ -90,7 +91,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     controllers = [controller_choice(name) for name in chosen if name in parts["controllers"] or name not in others]
     tree = {
         "rig": {
-            "plant": _part(plant(column)), "clock": CLOCK, "inputs": INPUTS,
+            "plant": _part(plant(column)), "clock": CLOCK, "inputs": inputs_part(rig),
             "start": _part(start), "rest": _part(rest),
             "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
         },
@@ -98,7 +99,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         **parts,
     }  # fmt: skip
     if functions is None:
-        functions = sorted(_needed([tree, _part(plant(worn)), _part(plant(tubes))]))
+        functions = sorted(_needed([tree, _part(plant(worn)), _part(plant(tubes)), *_of_rails()]))
     store, hello = Store(functions), greeting(rig, controllers)
     for kind, group in (("scenario", "scenarios"), ("sensors", "sensors"), ("controller", "controllers")):
         for one in hello["choices"][kind]:
@@ -126,7 +127,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         },
         "parts": numbers,
         "scenarios": {
-            name: {"duration": (lasts := find_scenario(name).duration), "path": path_of(begun(name), lasts)}
+            name: {"duration": (lasts := find_scenario(name).duration), "path": path_of(begun(name, rig), lasts)}
             for name in parts["scenarios"]
         },
         "sampled": {name: entry("sensors", name).made.sampled for name in parts["sensors"]},
@@ -142,28 +143,29 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
 
 
 def rig_numbers(rig: Parameters) -> dict[str, Any]:
-    """The rig's column, and what of it follows from the mass and friction that are set."""
+    """The rig's column, and what of it follows from the mass and friction that are set; a locked cylinder 1 is not ``free``."""
     cylinders = (rig.cylinder1, rig.cylinder2)
     return {
         "column": parameter_column(rig).tolist(),
+        "free": rig.linkage.free,
         "coulomb": [one.coulomb_friction for one in cylinders],
         "pressed": [one.pressure_friction for one in cylinders],
         "viscous": [one.viscous_friction for one in cylinders],
     }
 
 
-def begun(name: str) -> Parts:
+def begun(name: str, rig: Parameters) -> Parts:
     """Target, hand and setpoints of a nominal scenario, which are the same in every episode."""
-    parts: Parts = find_scenario(name).nominal()
+    parts: Parts = find_scenario(name).on(rig).nominal()
     for part, channel in zip(parts, ("reference", "user_force", "stiffness"), strict=True):
         part.prepare(1)  # type: ignore[attr-defined]
         part.begin(0, stream(0, 0, channel))  # type: ignore[attr-defined]
     return parts
 
 
-def scenario(name: str) -> dict[str, Part]:
+def scenario(name: str, rig: Parameters) -> dict[str, Part]:
     """A scenario's parts; none where one of them is not compiled."""
-    target, force, setpoints = begun(name)
+    target, force, setpoints = begun(name, rig)
     named = {"target": (target, "sample"), "setpoints": (setpoints, "sample"), "hand": (force, "force")}
     stages = {kind: stage for kind, part in named.items() if (stage := stage_of(*part))}
     return {kind: _part(stage) for kind, stage in stages.items()} if len(stages) == len(named) else {}
@@ -178,12 +180,12 @@ def path_of(scenario: Parts, duration: float) -> list[list[float]]:
 
 def _problem(name: str, rig: Parameters) -> str:
     """Why a rig cannot do a scenario: its target leaves the workspace, or the rig cannot carry its weight there."""
-    target, _, setpoints = begun(name)
+    target, _, setpoints = begun(name, rig)
     try:
         start = checked_start(target, setpoints, np.array([0]), 1, find_scenario(name).duration, rig)
         require_carried(start[:2], rig)
     except ValueError as error:
-        if name == "probe":  # with which the page opens
+        if name == OPENS_WITH[rig.linkage.kind]:
             raise
         return str(error)
     return ""
@@ -235,6 +237,12 @@ def controller_parts(law: StagedController) -> dict[str, dict[str, Part]]:
 
 def _part(*own: Stage) -> Part:
     return Part(own, {})
+
+
+def _of_rails() -> list[Any]:
+    """What the code of every rig has besides, for those with one cylinder."""
+    rail = Parameters().replace({"linkage.kind": RAIL})
+    return [inputs_part(rail), *(scenario(name, rail) for name in scenarios_for(rail))]
 
 
 def _needed(tree: Any) -> set[str]:

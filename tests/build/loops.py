@@ -26,7 +26,9 @@ OPTIONS = Parameters().replace(
 )
 
 BEGUN = {
-    **{f"{name} {sensors}": (name, {"sensors": sensors}) for name in names("scenario") for sensors in names("sensors")},
+    **{f"{name} {sensors}": (name, {"sensors": sensors}) for name in names("scenario") for sensors in ("ideal", "lab")},
+    **{f"circle {sensors}": ("circle", {"sensors": sensors}) for sensors in names("sensors")},
+    "forceps honest": ("forceps", {"sensors": "honest"}),
     **{hand: ("probe", {"user_force": hand}) for hand in ("sine", "noise", "guided")},
     "options": ("circle", {"parameters": OPTIONS, "sensors": "lab"}),
     "options, honest, no force sensor": ("forceps", {"parameters": OPTIONS, "sensors": "honest", "force_sensor": False}),
@@ -36,7 +38,8 @@ BEGUN = {
     "two fields": ("vacuum", {"randomize": {"mechanics.mass": (2.0, 3.0), "cylinder1.piston_diameter": (0.031, 0.032)}}),
     "contractions": ("probe", {"user_force": Contractions((-9.0, 9.0), 3, 1.3, (0, 9), (0.1, 0.9), 2.1)}),
 }
-"""Scenario and arguments of episodes that begin on a device."""
+"""Scenario and arguments of episodes that begin on a device: all that a test there begins, because code for what is missing is
+compiled anew. Not every scenario has every kind of sensors: what it draws does not depend on them."""
 
 SOFT = StiffnessSchedule(closed_loop=(10.0,))
 """So soft that no controller has gains for it."""

@@ -21,12 +21,12 @@ function fit(most) {
 
 const newtons = (value) => (Number.isFinite(value) ? `${value <= -0.5 ? "−" : value >= 0.5 ? "+" : " "}${Math.abs(value).toFixed(0)} N` : "–");
 
-export function drawForces(context, width, { pressures, friction }, { areas, atmosphere }) {
+export function drawForces(context, width, { pressures, friction }, { areas, atmosphere, cylinders }) {
   const air = airForces(pressures, areas, atmosphere);
-  fit(Math.max(...[...air, ...friction].map(Math.abs).filter(Number.isFinite), 0));
-  [0, 1].forEach((i) => {
-    drawBar(context, width, 2 * i, `air ${i + 1}`, air[i] / range, newtons(air[i]), pen.colour("cylinder-1"));
-    drawBar(context, width, 2 * i + 1, "friction", -friction[i] / range, newtons(-friction[i]), pen.FORCE);
+  fit(Math.max(...cylinders.flatMap((k) => [air[k], friction[k]]).map(Math.abs).filter(Number.isFinite), 0));
+  cylinders.forEach((k, i) => {
+    drawBar(context, width, 2 * i, `air ${k + 1}`, air[k] / range, newtons(air[k]), pen.colour("cylinder-1"));
+    drawBar(context, width, 2 * i + 1, "friction", -friction[k] / range, newtons(-friction[k]), pen.FORCE);
   });
-  drawEnds(context, width, 4, [`in ${range}`, "", `${range} N out`]);
+  drawEnds(context, width, 2 * cylinders.length, [`in ${range}`, "", `${range} N out`]);
 }

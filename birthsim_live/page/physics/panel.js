@@ -1,5 +1,6 @@
 // The panel "Physics": what makes the force that the hand feels. It draws only while it is open.
 
+import { chambersOf } from "../frame.js";
 import { Sheet } from "../sheet.js";
 import { term } from "../terms.js";
 import { Ellipse } from "./ellipse.js";
@@ -32,8 +33,8 @@ export class Physics {
     this.button.setAttribute("aria-expanded", String(wanted));
   }
 
-  setUp({ air, areas }) {
-    this.rig = { ...air, areas };
+  setUp({ air, areas, cylinders }) {
+    this.rig = { ...air, areas, cylinders, chambers: chambersOf(cylinders) };
   }
 
   push(frame) {
@@ -50,7 +51,7 @@ export class Physics {
     this.last = now;
     const { ellipse, work } = this.rigs[k];
     const draw = [
-      (context, width) => drawValves(context, width, frame),
+      (context, width) => drawValves(context, width, frame, this.rig),
       (context, width) => drawForces(context, width, frame, this.rig),
       (context, width, height) => ellipse.draw(context, width, height, frame),
     ];

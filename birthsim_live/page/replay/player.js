@@ -118,7 +118,10 @@ export class Player {
 }
 
 /** Whether the page can draw the rig of a recording: it has the shape of its own rig. */
-export function isDrawn({ header: { rig } }, { geometry }) {
-  const own = ["d3", "d6", "k1", "k2", "gamma3"].every((name) => Math.abs(rig.geometry[name] - geometry[name]) < 1e-9);
-  return own && [1, 2].every((k) => Math.abs(rig[`cylinder${k}`]?.stroke / 2 - geometry[`half_stroke${k}`]) < 1e-9);
+export function isDrawn({ header: { rig } }, { geometry, guide, cylinders }) {
+  const rail = rig.linkage?.kind === "rail" && (rig.linkage.inclination ?? 0);
+  if ((rail === false) !== (guide === null) || (guide && Math.abs(Math.sin(rail) - guide[1]) > 1e-9)) return false;
+  const names = guide ? ["d3", "d6", "k2"] : ["d3", "d6", "k1", "k2", "gamma3"]; // k1 and gamma3 of a rail follow from the others
+  const own = names.every((name) => Math.abs(rig.geometry[name] - geometry[name]) < 1e-9);
+  return own && cylinders.every((k) => Math.abs(rig[`cylinder${k + 1}`]?.stroke / 2 - geometry[`half_stroke${k + 1}`]) < 1e-9);
 }

@@ -6,11 +6,12 @@ import { FIELDS, frameOf as completed } from "../frame.js";
 export function instant(session) {
   const { pack, hands } = session;
   const info = session.shown();
+  const { guide } = pack.hello;
   const known = {
     time: [session.time],
     episode_time: [session.episodeTime],
-    scenario_force: session.some("scenario_force_x", 2),
-    drag_force: session.some("pointer_force_x", 2),
+    scenario_force: borne(session.some("scenario_force_x", 2), guide),
+    drag_force: borne(session.some("pointer_force_x", 2), guide),
     pointer: hands.pointer(session.some("x", 2), session.loop.get("pointer_stiffness")),
   };
   const of = (name) => {
@@ -18,6 +19,13 @@ export function instant(session) {
     return Array.from(info.subarray(first, first + count));
   };
   return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? of(name)]));
+}
+
+/** What of a force acts along a rail's guide. */
+function borne(force, guide) {
+  if (!guide) return force;
+  const along = force[0] * guide[0] + force[1] * guide[1];
+  return guide.map((part) => along * part);
 }
 
 /** The present instant as a row of numbers. */

@@ -146,12 +146,12 @@ export class Session {
 
   /** Write the rig that moves: mass and friction as set. */
   describeRig() {
-    const { column, coulomb, pressed, viscous } = this.pack.rig;
+    const { column, free, coulomb, pressed, viscous } = this.pack.rig;
     const { mass, friction } = this.settings;
     this.loop.rows.set(column);
     this.loop.set("rig_mass", mass);
     this.loop.set("rig_inverse_mass", 1 / mass);
-    this.loop.set("rig_inverse_mass1", 1 / mass);
+    this.loop.set("rig_inverse_mass1", free / mass);
     coulomb.forEach((force, k) => {
       this.loop.set(`rig_fc${k + 1}`, force * friction);
       this.loop.set(`rig_fp${k + 1}`, pressed[k] * friction);

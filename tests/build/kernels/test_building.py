@@ -73,8 +73,9 @@ def test_a_path_asks_for_the_same_again(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_libraries_for_windows_and_macos_are_linked(built, tmp_path):
-    """Nobody has run them."""
+    """Nobody has run them. The linker first compiles what every program of these systems has, three minutes of it."""
     files = build(tmp_path / "every", tmp_path / "work", "0", "every")
     assert {name: files[name] for name in SHIPPED} == {name: built[1][name] for name in SHIPPED}
     heads = {name: (tmp_path / "every" / name).read_bytes()[:4] for name in LIBRARIES if name not in SHIPPED}

@@ -36,6 +36,7 @@ ANOTHER = {
     "scenario": "circle", "scenario_force": True, "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve",
 }  # fmt: skip
 """Settings of another rig, other setpoints, and one valve per cylinder."""
+RAIL = Parameters().replace({"linkage.kind": "rail", "linkage.inclination": 0.5, "mechanics.mass": 2.0})
 FEW = {"backstepping", "admittance-backstepping", "residual:circle", "lqr"}
 
 
@@ -44,9 +45,9 @@ class Hand(UserForce):
 
     closed_loop = True
 
-    def __init__(self, scenario, pushes, position=None, force=(0.0, 0.0)):
+    def __init__(self, scenario, rig, pushes, position=None, force=(0.0, 0.0)):
         self.own, self._pushes, self._place, self._push = (
-            find_scenario(scenario).nominal()[1],
+            find_scenario(scenario).on(rig).nominal()[1],
             pushes,
             position,
             np.array(force),
@@ -77,7 +78,7 @@ def expected(controller, settings, hold, rig):
         for own in ("coulomb_friction", "pressure_friction", "viscous_friction"):
             changes[f"{name}.{own}"] = getattr(cylinder, own) * friction
     world = {"rig": rig, "parameters": rig.replace(changes), "valves": settings.get("valves", "two_valves")}
-    world["user_force"] = Hand(scenario, settings.get("scenario_force", False), **hold)
+    world["user_force"] = Hand(scenario, rig, settings.get("scenario_force", False), **hold)
     if "Kclx" in settings:
         world["stiffness"] = StiffnessSchedule(closed_loop=(settings["Kclx"],), closed_loop_y=(2000.0,))
     return loop_rows(scenario, settings.get("sensors", "ideal"), controller, PERIODS, **world)
@@ -146,3 +147,13 @@ def test_both_rigs_are_what_each_would_be_alone(page, one, other):
 def test_a_rig_of_ones_own(tmp_path, rig):
     write_page(tmp_path / "page", packed_page(rig))
     check(tmp_path / "page", (on_the_circle("admittance-backstepping", "lab"), PULL), rig=rig)
+
+
+@pytest.mark.slow
+def test_a_rail_whose_guide_bears_what_pulls_across_it(tmp_path):
+    write_page(tmp_path / "page", packed_page(RAIL))
+    cases = zip(scenarios_for(RAIL), ("ideal", "lab", "encoders"), (PULL, HARD, None), strict=True)
+    told = [({"scenario": one, "sensors": kind, "scenario_force": True, "mass": 4.0}, hold) for one, kind, hold in cases]
+    check(
+        tmp_path / "page", *told, ({"scenario": "rail", "controller": "abry-one-valve", "valves": "one_valve"}, PULL), rig=RAIL
+    )
