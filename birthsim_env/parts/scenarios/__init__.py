@@ -43,6 +43,9 @@ class Scenario:
     studied: ClassVar[bool] = False
     """Whether studies measure it. Reference scores, fingerprints and a training's configuration are then stored of it."""
 
+    scored: ClassVar[bool] = False
+    """Whether reference scores are stored of it though studies do not measure it."""
+
     linkage: ClassVar[str] = TWO_CYLINDERS
     """``linkage.kind`` of the rigs that it is for; without ``parameters`` it is done with the default one of them."""
 
@@ -87,6 +90,11 @@ def scenarios_for(rig: Parameters) -> list[str]:
 def studied_scenarios() -> list[str]:
     """Names of the scenarios that studies measure, and of which numbers are stored."""
     return [one.name for one in entries("scenario") if one.made.studied]
+
+
+def scored_scenarios() -> list[str]:
+    """Names of the scenarios of which reference scores are stored."""
+    return [one.name for one in entries("scenario") if one.made.studied or one.made.scored]
 
 
 def environment_id(scenario: str, kind: str = "") -> str:

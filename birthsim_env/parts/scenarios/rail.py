@@ -27,6 +27,7 @@ class OnRail(Scenario):
     """A scenario of a rig with one cylinder, whose places follow from the rail."""
 
     linkage = RAIL
+    scored = True
 
     def __init__(self) -> None:
         self._rig = Parameters().replace({"linkage.kind": RAIL})

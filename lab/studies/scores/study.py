@@ -13,12 +13,13 @@ from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
 from baselines.named import make_controller, uncontrolled_names
 from baselines.work.tasks import Result, Task
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.ids import rig_for
+from birthsim_env.parts.scenarios import environment_id, scored_scenarios
 from birthsim_env.registry import names, register
 from birthsim_env.scores import RIGS, ROLES, SENSORS
 from lab.engine.results import Content, written
 from lab.engine.study import Found, Options, Study
-from lab.studies.comparison.grid import ENVIRONMENTS, default_controllers
+from lab.studies.comparison.grid import default_controllers
 from lab.studies.scores.tables import Scored, data, informed, overview
 
 REFERENCE = "reference_scores.json"
@@ -38,7 +39,8 @@ _CAPTION = (
 def _tasks(options: Options) -> dict[Any, Task]:
     if options.episodes < 2:
         raise ValueError(f"--episodes {options.episodes}; allowed: 2 or more, half of them choose the best controller")
-    conditions = [(name, sensors, rig) for name in ENVIRONMENTS for sensors in SENSORS for rig in RIGS]
+    scored = map(environment_id, scored_scenarios())
+    conditions = [(name, sensors, rig) for name in scored for sensors in SENSORS for rig in RIGS]
     return {
         (where, controller): _task(where, controller, policy, options)
         for where in conditions
@@ -73,7 +75,7 @@ def score_cell(
 ) -> Result:
     """Figures of one controller in one environment under one condition; ``policy`` is a shipped policy's folder or "", and its
     ``network``'s hash only tells results of different policies apart."""
-    rig = Parameters()
+    rig = rig_for(environment, None)
     law = make_controller("residual", rig, policy=SHIPPED / policy) if policy else make_controller(controller, rig)
     result = evaluate(environment, law, controller, episodes, seed, progress=False, sensors=sensors, randomize=randomize)
     if len(result.seeds) < episodes:
