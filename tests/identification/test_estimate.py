@@ -208,6 +208,7 @@ def test_the_curve_of_the_valves_is_found_from_five_seconds() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_valve_unlike_the_others_is_named() -> None:
     (line,) = [line for line in identify(log_of(valve_n2__supply_overlap=0.03), OWNER, 0).words() if "fit worse" in line]
     assert line.startswith("pressures_N2")

@@ -180,6 +180,7 @@ def test_encoders_tell_friction_and_their_zeros() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_supply_line_is_named() -> None:
     rig = TRUE.replace({"air.supply_conductance": 6e-9})
     log = run_plan(propose(OWNER, 5.0, 0), [rig], make_controller("backstepping", OWNER), "lab", 5)[0]

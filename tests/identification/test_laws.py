@@ -125,6 +125,7 @@ def test_where_noise_hides_friction_the_owners_law_is_kept() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_friction_that_no_law_has_is_warned_of() -> None:
     """Friction that varies along the stroke, by the second model."""
     carry = strange(TRUE, Strangeness(friction_wave=0.3))

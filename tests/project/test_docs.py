@@ -220,7 +220,7 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
 
 @pytest.mark.slow
 @axe.NEEDED
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.weekly)])
 def test_axe_finds_nothing_on_the_site(site, page_of, theme):
     page = page_of("")
     page.emulate_media(color_scheme=theme)

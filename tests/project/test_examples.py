@@ -12,6 +12,7 @@ from tests.console import ROOT
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_policy_learns_from_tensors_of_a_device():
     pytest.importorskip("torch")
     need_threads()

@@ -81,6 +81,7 @@ def test_nothing_moves_and_axe_finds_nothing(chromium, server, theme):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_learned_to_the_end_it_gives_way_as_a_spring(chromium, server):
     with opened(chromium, server) as window:
         window.page.locator("#learn").click()
