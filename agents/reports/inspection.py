@@ -123,7 +123,7 @@ def frictionless_circle(policy: Policy) -> tuple[float, float]:
     """Settled RMS error on x, mm, of the law and with the policy: a circle of 100 mm in 4 s at 2000 N/m without friction."""
     rig, circle = Parameters().replace(FRICTIONLESS), Circle(radius=0.1)
     errors = []
-    for act in (lambda seen: np.zeros((len(seen), policy.settings.size)), policy.network.acting()):
+    for act in (lambda seen: np.zeros((len(seen), policy.network.outputs)), policy.network.acting()):
         _, taken = _follow(act, policy.settings, 1, 12.0, circle, {}, rig)
         errors.append(1e3 * float(np.sqrt(np.mean(taken["tracking_error"][400:, 0, 0] ** 2))))
     return errors[0], errors[1]

@@ -29,7 +29,6 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.topology import refuse_rail
 
 STIFFEST = 4000.0
 """N/m: the law is made no stiffer than that, unless more is asked for. With 6000 rigs of 2.4 kg and less with valves of 7 ms
@@ -58,6 +57,9 @@ NAMES = (
 )
 """What the entries of an action say."""
 
+ON_RAIL = (NAMES[1], NAMES[2].replace("Kclx", "Kcl"), NAMES[4])
+"""What they say on a rail: the stiffness is that along it, of x and of y alike."""
+
 VALVE_NAMES = tuple(f"opening of the valve of chamber {chamber}, 1" for chamber in ("P1", "N1", "P2", "N2"))
 """What they say without a law."""
 
@@ -68,13 +70,10 @@ UNEXPLAINED = tuple(
 
 
 def action_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> tuple[str, ...]:  # noqa: B008  frozen
-    """What each entry of an action says, on a ``rig``."""
-    if not rig.linkage.is_rail:
-        return VALVE_NAMES if settings.law == NO_LAW else NAMES[: settings.size]
-    if settings.impedance != "fixed" or settings.informed:
-        refuse_rail(rig, "a residual with impedance other than 'fixed', or informed,")
-    topology = rig.linkage.topology
-    return tuple(VALVE_NAMES[k] for k in topology.chambers) if settings.law == NO_LAW else NAMES[topology.cylinders[0] : 2]
+    """What each entry of an action says, on a ``rig``: a rail has one for each pair."""
+    if settings.law == NO_LAW:
+        return tuple(VALVE_NAMES[k] for k in rig.linkage.topology.chambers)
+    return NAMES[: settings.size] if not rig.linkage.is_rail else ON_RAIL[: (settings.size + 1) // 2]
 
 
 def memory_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> tuple[str, ...]:  # noqa: B008  frozen
@@ -82,7 +81,8 @@ def memory_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> 
     cylinders = rig.linkage.topology.cylinders
     smooth = (f"smoothed action: {name}" for name in action_names(settings, rig))
     left = (f"fraction of the authority on cylinder {i + 1}, 1" for i in cylinders)
-    return (*smooth, *left, *UNEXPLAINED[cylinders[0] :: 3 - len(cylinders)], *(features.ENTRIES if settings.informed else ()))
+    told = features.entries_of(rig) if settings.informed else ()
+    return (*smooth, *left, *UNEXPLAINED[cylinders[0] :: 3 - len(cylinders)], *told)
 
 
 def observation_names(settings: ResidualSettings, rig: Parameters = Parameters()) -> tuple[str, ...]:  # noqa: B008  frozen
@@ -121,7 +121,7 @@ class Constants(Numbers):
     stiffens = number("1", "1 where the impedance has a stiffness")
     damps = number("1", "1 where it has a damping")
     first = number("1", "the first cylinder that is corrected; 1 on a rail, which has one")
-    told = number("1", "how many entries of ``features.EstimatorFeatures`` are shown")
+    told = number("1", "how many entries of ``features.entries_of`` are shown")
     period = number("s", "control period")
     rig = part(Rig, "the rig as described")
 
@@ -154,16 +154,21 @@ def stiffen(force: Array, powers: Array, asked: Reference, n: int) -> None:
 
 @helper
 def _correct(action: Array, limiter: authority.Limiter, constants: Constants, smooth: Action, said: Correction, n: int) -> None:
-    """Writes what actions (size, n) say; ``smooth`` goes on by one period towards them."""
+    """Writes what actions (size, n) say; ``smooth`` goes on by one period towards them.
+
+    On a rail one entry stands for each pair of an ``Action``: its power is that of the stiffness along x and along y.
+    """
     size, most, left, first = action.shape[0], constants.authority, limiter.left, int(constants.first)
+    each = 2 - first
     for i in range(n):
         said.force[0, i], said.rate[0, i], said.powers[0, i], said.powers[1, i] = 0.0, 0.0, 0.0, 0.0
         for k in range(first, 2):
             strength, smoothed = most * left[k, i], smooth.rows[k - first, i]
             said.force[k, i] = strength * smoothed
             said.rate[k, i] = strength / constants.time_constant * (action[k - first, i] - smoothed)
-            said.powers[k, i] = max(smooth.powers[k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
-        said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth.damping[i], 0.0)) if size > 4 else 0.0
+        for k in range(2 if size > each else 0):
+            said.powers[k, i] = max(smooth.rows[each + k * (1 - first), i], 0.0) * min(left[0, i], left[1, i])
+        said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth.rows[2 * each, i], 0.0)) if size > 2 * each else 0.0
         for k in range(size):
             smooth.rows[k, i] += constants.quickness * (action[k, i] - smooth.rows[k, i])
 
@@ -195,10 +200,10 @@ def _stage(world: int, seen: Seen, memory: Memory, constants: Constants, tables:
         for k in range(unexplained.Forces.size // (1 + first)):
             force = memory.unexplained.rows[(1 + first) * k + first, i]
             shown[size + 2 - first + k, i] = max(-LIMIT, min(LIMIT, force / constants.unit))
+        after = size + (2 + unexplained.Forces.size) // (1 + first)
         for k in range(int(constants.told)):
-            shown[size + 2 + unexplained.Forces.size + k, i] = max(
-                -LIMIT, min(LIMIT, seen.intermediate[ObservedPistons.size + k, i])
-            )
+            value = features.told_of(seen, k, first, constants.rig, i)
+            shown[after + k, i] = max(-LIMIT, min(LIMIT, value))
         for valve in range(2 * first, 4 if constants.has_law == 0.0 else 0):
             seen.opening[valve, i] = action[valve - 2 * first, i]
     if constants.stiffens > 0.0:
@@ -235,7 +240,7 @@ class CorrectedController(StagedController):
             quickness=1.0 - exact.number("exp", -board.control_period / settings.time_constant),
             stiffens=settings.impedance != "fixed",
             damps=settings.impedance == "variable",
-            told=features.EstimatorFeatures.size if settings.informed else 0,
+            told=len(features.entries_of(self.parameters)) if settings.informed else 0,
         )
         own = ControllerStage(_stage, constants, Memory.lane(limiter=authority.Limiter.lane(left=1.0)))
         known = [observed(self.parameters, sampled)]

@@ -39,6 +39,8 @@ class ResidualEnv(_InnerController, BirthSIMEnv):
     | `"variable_kp"` | and an exponent of 4 for the stiffness Kclx, Kcly that the law works with; less than zero is zero |
     | `"variable"` | and an exponent of 2 for the damping; less than zero is zero |
 
+    On a rail each pair is one entry: a force on the only cylinder, and the stiffness along the rail.
+
     However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for. Except with
     `"fixed"`, the law works less stiffly for a while where pistons swing faster than 0.25 m/s, whatever the action
     (`agents.residual.authority`).

@@ -14,7 +14,8 @@ from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference, compliance
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.observation import Entry
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.linkage import geometry
 from birthsim_env.physics.rig.parameters import Parameters
@@ -35,10 +36,28 @@ class EstimatorFeatures(Rows):
 SCALES = np.repeat([1e-3, 0.02, 5e-3, 0.1, 2.0, 20.0, 20.0], 2)
 """What maps to 1."""
 
-ENTRIES = tuple(
-    str(Entry(about.format(name), unit, scale))
-    for (name, unit, about, _), scale in zip(EstimatorFeatures.entries(), SCALES, strict=True)
-)
+VECTORS = EstimatorFeatures.unseen.first
+"""Rows of vectors; each piston has one of those that follow."""
+
+
+def entries_of(rig: Parameters) -> tuple[str, ...]:
+    """What is shown of a rig: on a rail one entry of each pair, along it or of its cylinder."""
+    every = [(k, name, unit, about) for k, (name, unit, about, _) in enumerate(EstimatorFeatures.entries())]
+    if rig.linkage.is_rail:
+        every = [(k, "along the rail" if k < VECTORS else name, unit, about) for k, name, unit, about in every[1::2]]
+    return tuple(str(Entry(about.format(name), unit, SCALES[k])) for k, name, unit, about in every)
+
+
+@helper
+def told_of(seen: Seen, k: int, first: int, p: Rig, i: int) -> float:
+    """Entry ``k`` of ``entries_of`` a rig whose ``first`` cylinder is 0, or 1 on a rail, in lane i."""
+    pair = ObservedPistons.size + (1 + first) * k
+    if first == 0:
+        return float(seen.intermediate[pair, i])
+    if 2 * k >= VECTORS:
+        return float(seen.intermediate[pair + 1, i])
+    # The direction of the rail, whose inclination is gamma3 less a right angle.
+    return float(p.sin_gamma3 * seen.intermediate[pair, i] - p.cos_gamma3 * seen.intermediate[pair + 1, i])
 
 
 class Constants(EstimatorParameters):

@@ -9,7 +9,6 @@ import pytest
 
 import birthsim
 from baselines.bench.metrics import NOT_OF_A_RAIL, UNITS
-from birthsim.commands import live
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
 from birthsim_env.parts.references import FixedTarget, Sine
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
@@ -137,7 +136,6 @@ def test_an_idle_cylinder_draws_no_air_and_turns_no_valves():
         ({"id": "BirthSIM/Circle-v2", "parameters": RIG}, ("linkage.kind", "rail", "two-cylinders")),
         ({"id": "BirthSIM/Rail-v0", "parameters": RIG, "reference": FixedTarget((0.5, 0.0))}, ("reference", "rail", "0.5")),
         ({"id": "BirthSIM/Rail-v0", "reference": Sine(amplitude=0.3)}, ("reference", "rail", "0.3 to 0.7")),
-        ({"id": "BirthSIM/RailResidual-v0", "impedance": "variable"}, ("linkage.kind", "rail", "fixed", "two-cylinders")),
         ({"id": "BirthSIM/Rail-v0", "randomize": {"linkage.inclination": (0, 1)}}, ("linkage.inclination", "randomize")),
     ],
 )
@@ -145,14 +143,6 @@ def test_what_is_not_for_one_cylinder_is_refused_by_name(arguments, named):
     with pytest.raises(ValueError, match=named[0]) as refused:
         birthsim.make(arguments.pop("id"), **arguments).reset(seed=0)
     assert all(word in str(refused.value) for word in named)
-
-
-def test_the_page_does_not_know_a_rail_yet_and_says_so(tmp_path):
-    RIG.to_toml(tmp_path / "rail.toml")
-    page = live.Settings(parameters=str(tmp_path / "rail.toml"), static=tmp_path / "page")
-    with pytest.raises(ValueError, match=r"linkage\.kind = 'rail': .*allowed: 'two-cylinders'"):
-        live.main(page)
-    assert [one.name for one in tmp_path.iterdir()] == ["rail.toml"]
 
 
 def test_a_level_rail_bears_a_mass_that_the_cylinder_could_not_lift():

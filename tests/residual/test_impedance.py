@@ -12,9 +12,10 @@ from agents.residual.settings import ResidualSettings
 from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.parts.scenarios import environment_id, scenarios_for
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.registry import names
 from tests.oracles import closed_loop
 
 PROBE, CIRCLE = "BirthSIM/ProbeResidual-v3", "BirthSIM/CircleResidual-v2"
@@ -162,11 +163,12 @@ def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
         np.testing.assert_array_equal(inside.simulation.openings.T, action)
 
 
-@pytest.mark.parametrize("scenario", scenarios_for(Parameters()))
+@pytest.mark.parametrize("scenario", names("scenario"))
 def test_whatever_a_policy_says_there_are_gains(scenario: str) -> None:
     """All entries at their limits, in all combinations: a law without gains would refuse by an exception."""
-    corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 5)).reshape(5, -1).T.astype(np.float32)
     name = environment_id(scenario, "Residual")
+    (size,) = gymnasium.make(name, impedance="variable").action_space.shape or ()
+    corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * size)).reshape(size, -1).T.astype(np.float32)
     env = gymnasium.make_vec(name, num_envs=len(corners), impedance="variable", randomize=True)
     env.reset(seed=0)
     rng = np.random.default_rng(0)

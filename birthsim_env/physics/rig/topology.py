@@ -109,9 +109,3 @@ def locked_rows() -> Iterator[tuple[str, Derived]]:
             name,
             derived("m3/(s Pa)", f"leakage conductance, valve of chamber {chamber.upper()}", partial(_leakage, k // 2), name),
         )
-
-
-def refuse_rail(rig: Any, what: str) -> None:
-    """Raise ``ValueError`` where ``what`` cannot be done with a rail."""
-    if rig.linkage.is_rail:
-        raise ValueError(f"linkage.kind = {RAIL!r}: {what} needs two cylinders; allowed: {TWO_CYLINDERS!r}")
