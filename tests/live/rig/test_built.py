@@ -7,6 +7,7 @@ import pytest
 
 import birthsim_env
 from birthsim_env import registry
+from birthsim_env.parts.scenarios import scenarios_for
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import FIELDS
 from birthsim_live.rig.build import build
@@ -27,6 +28,8 @@ def test_a_fresh_build_is_equal(tmp_path, monkeypatch):
     for kind, choices in CARRIED["hello"]["choices"].items():
         if kind in registry.ROOMS:
             known = {one["name"] for one in choices}
+            if kind == "scenario":  # the code of every rig has those of rails too, which this one does not list
+                known |= {name for name in registry.names(kind) if name not in scenarios_for(Parameters())}
             kept = {one.name: one for one in registry.entries(kind) if one.name in known or not one.listed}
             monkeypatch.setitem(registry._ENTRIES, kind, kept)
     build(tmp_path)
