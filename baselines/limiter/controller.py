@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.controller import Controller, checked_command
+from baselines.controller import Controller, Remarking, checked_command
 from baselines.impedance import Impedance, declared_by
 from baselines.inputs import lanes_of, one_lane
 from baselines.limiter import air_spring
@@ -219,6 +219,10 @@ class PortLimiter(StagedController):
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """That of the law, which holds where neither limit acts."""
         return declared_by(self.law, reference)
+
+    def remarks(self) -> list[str]:
+        """What the law has to say of the control so far."""
+        return self.law.remarks() if isinstance(self.law, Remarking) else []
 
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         period = self.parameters.electronics.control_period

@@ -47,3 +47,9 @@ def test_what_a_piece_remarks_reaches_the_evaluation_that_pieces_make_up():
     tasks = evaluation_tasks("mine", own, "BirthSIM/Probe-v3", world, 2, 3)
     results = [task.work(**task.settings) for task in tasks]
     assert gathered("mine", [*results, *results]).remarks == pushed(CALM)[1]
+
+
+def test_a_limiter_hands_on_what_its_law_remarks():
+    law = make_controller("limited:admittance-sensorless", RIG)
+    found = evaluate("BirthSIM/Probe-v3", law, "mine", 2, 3, progress=False, sensors="honest", parameters=CALM)
+    assert found.remarks == law.remarks() == pushed(CALM)[1]
