@@ -59,6 +59,9 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
     env.reset(seed=seed)
     simulation = env.unwrapped.simulation
     groups = {name: simulation.pipeline.group(name) for name in pipeline.ORDER if name not in ("actuation", "outcome")}
+    # What a rail bears of a hand's force it bears of a person's too, behind which its guide stands.
+    guide = guide_stage().function
+    groups["hand"] = [stage for stage in groups["hand"] if stage.function is not guide]
     parts = {name: Part(tuple(stages), {}) for name, stages in groups.items() if stages}
     parts |= {"clock": CLOCK, "inputs": inputs_part(rig)}
     parts = {name: parts[name] for name in ORDER if name in parts}
