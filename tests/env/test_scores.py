@@ -22,6 +22,9 @@ PROBE = environment_id("probe")
 """For three of its seven seconds nothing pushes. Shut valves stand on the target then, the paper's law hunts: on drawn rigs
 they pay more than it, though their settled error is larger."""
 
+STIFFENED = environment_id("rail-stiffness")
+"""There too the target rests; on drawn rigs shut valves and the paper's law are paid alike."""
+
 
 @pytest.mark.parametrize(
     ("environment", "episodes", "options"),
@@ -54,7 +57,8 @@ def test_every_id_and_condition_has_scores_in_order(environment, sensors, random
     paid = {role: entry["return"] for role, entry in known.items()}
     assert paid["random valves"] < min(paid["shut valves"], paid["paper's law"])
     assert max(paid["shut valves"], paid["paper's law"]) < paid["best classical law"]
-    assert (paid["shut valves"] < paid["paper's law"]) == ((environment, randomize) != (PROBE, True))
+    if (environment, randomize) != (STIFFENED, True):
+        assert (paid["shut valves"] < paid["paper's law"]) == ((environment, randomize) != (PROBE, True))
     assert known["shut valves"]["error"] > known["paper's law"]["error"] > known["best classical law"]["error"]
     ends = [paid["shut valves"], paid["best classical law"], math.nan]
     np.testing.assert_allclose(normalized_score(environment, ends, sensors, randomize), [0, 100, math.nan], atol=1e-9)
