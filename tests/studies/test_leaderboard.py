@@ -12,7 +12,8 @@ from lab.studies import leaderboard
 def test_the_table_is_that_of_the_entries():
     assert leaderboard.TABLE.read_text(encoding="utf-8") == leaderboard.table()
     rows = [line.split(" | ") for line in leaderboard.table().splitlines()[4:]]
-    assert [row[1] for row in rows] == ["admittance-adaptive", "pid", "backstepping"]
+    on_rail = ["rail-admittance-adaptive", "rail-abry"]
+    assert [row[1] for row in rows] == ["admittance-adaptive", "pid", "backstepping", *on_rail]
     said = json.loads((leaderboard.ENTRIES / "pid.json").read_text())["results"][0]["episodes"]["settled_rms"]
     assert float(rows[1][7]) == pytest.approx(np.median(said), rel=5e-3)
 
