@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from birthsim.exports.dataset import LEVELS, Settings, card, made, recorded
+from birthsim_env import scores
 
 PROBE, RAIL = "BirthSIM/Probe-v3", "BirthSIM/Rail-v0"
 
@@ -34,8 +35,10 @@ def test_on_a_rail_the_expert_drives_the_valves_that_there_are():
     assert expert.rewards.mean() > 2 * random.rewards.mean()
 
 
-@pytest.mark.parametrize(("environment", "scored"), [(PROBE, True), (RAIL, False)])
-def test_a_card_tells_scores_only_where_there_are_some(environment, scored, tmp_path):
+@pytest.mark.parametrize(("environment", "scored"), [(PROBE, True), (RAIL, True), (RAIL, False)])
+def test_a_card_tells_scores_only_where_there_are_some(environment, scored, tmp_path, monkeypatch):
+    if not scored:
+        monkeypatch.setattr(scores, "_scored", dict)  # as for a scenario of another package
     settings = Settings(to="minari", env=environment, level="random", out=tmp_path)
     text = card(settings, "birthsim/some/random-v0", list(recorded(environment, "random", range(5, 6))))
     assert "| return, mean | " in text
