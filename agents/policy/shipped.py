@@ -25,7 +25,7 @@ def loadable_names() -> list[str]:
 
 
 def loadable_for(rig: Parameters) -> list[str]:
-    """Those of scenarios that can be done with a rig."""
+    """``loadable_names`` of policies whose scenario can be done with a rig."""
     known = {environment_id(scenario, "Residual") for scenario in scenarios_for(rig)}
     loadable = loadable_names()
     return [one.name for one in entries("policy") if one.name in loadable and _settings(one.made)["environment"] in known]

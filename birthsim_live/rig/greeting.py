@@ -71,8 +71,8 @@ def default_settings(rig: Parameters) -> dict[str, Any]:
 
 
 def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str, Any]:
-    """It, with the choices of ``controllers``; ``cylinders`` are those that move, of 0 and 1; along a rail's ``guide``, a
-    direction, acts all that it leaves of a hand's force."""
+    """It, with the choices of ``controllers``. ``cylinders`` are those that move, counted from 0; a rail's ``guide`` is the
+    direction along which alone a hand's force acts, and None elsewhere."""
     g, air = rig.geometry, rig.air
     named = {"scenario": scenarios_for(rig), "valves": VALVE_LAYOUTS, "sensors": names("sensors")}
     return {

@@ -240,7 +240,7 @@ def _part(*own: Stage) -> Part:
 
 
 def _of_rails() -> list[Any]:
-    """What the code of every rig has besides, for those with one cylinder."""
+    """Parts of rigs with one cylinder: the code of every rig has their functions too."""
     rail = Parameters().replace({"linkage.kind": RAIL})
     return [inputs_part(rail), *(scenario(name, rail) for name in scenarios_for(rail))]
 
