@@ -11,7 +11,10 @@ from birthsim_env import __version__
 
 @dataclass(frozen=True)
 class Variable:
-    """A number of the model. ``causality`` is "independent" (the time), "parameter", "input" or "output"; SI units."""
+    """A number of the model. ``causality`` is "independent" (the time), "parameter", "input" or "output"; SI units.
+
+    An input ``is_sample`` where it may be anything, also not finite: the model itself looks after it.
+    """
 
     name: str
     causality: str
@@ -20,6 +23,7 @@ class Variable:
     start: float = 0.0
     least: float = -math.inf
     most: float = math.inf
+    is_sample: bool = False
 
 
 @dataclass(frozen=True)

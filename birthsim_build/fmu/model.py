@@ -1,33 +1,19 @@
-"""A model for FMI: which rows of a built loop are its inputs and outputs, and the C header that says so."""
+"""A model for FMI: the image of a unit, and the C header that says which of its rows are inputs and outputs."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
-from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
+from birthsim_build.fmu.derived_parameters import derived_parameters
 from birthsim_build.fmu.description import Description, Variable
-from birthsim_build.image import HEAD, Part, Words, changing_words, function_name, packed_image, packed_part, packed_rows
-from birthsim_build.layout import LAYOUT, Row
-from birthsim_build.loops import World
-from birthsim_env.loop.rows import FORCE, MOTION, OPENING, POSITION, REFERENCE, SHOWN, STATE, WORLD
-from birthsim_env.loop.signals import REFERENCES
-from birthsim_env.physics.compiled.lanes import STATES, Array
+from birthsim_build.fmu.units import Input, Unit
+from birthsim_build.image import HEAD, Words, changing_words, function_name, packed_image, packed_part, packed_rows
+from birthsim_build.layout import Row
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
-
-_PLANT, _LOOP = ("board", "plant", "sensors"), ("sensors", "law", "valves", "board", "plant")
-"""Parts of a model's control period, in order. A law acts on what is measured when the period begins: the hand's force of that
-instant comes in just before."""
-_OPENINGS = range(WORLD + OPENING, WORLD + SHOWN)
-_FORCES = range(FORCE, FORCE + 2)
-_REFERENCE = range(WORLD + REFERENCE, WORLD + REFERENCE + REFERENCES)
-_MOST_FORCE = 1e4
-"""N, assumed: several times what the cylinders of any such rig push with; more is a mistake of the tool that sets it."""
-_TRUTH = range(STATE, STATE + STATES), range(MOTION, MOTION + 4)
-_MEASURED = (range(WORLD + POSITION, WORLD + REFERENCE),)
 
 
 @dataclass(frozen=True)
@@ -40,32 +26,26 @@ class Model:
     description: Description
 
 
-def fmu_model(identifier: str, about: str, world: World, law: Part | None, rig: Parameters) -> Model:
-    """The plant with its sensors, moved by openings and the hand's force; with ``law``, moved by setpoints and that force.
+def fmu_model(identifier: str, about: str, rows: Array, unit: Unit, rig: Parameters) -> Model:
+    """The model of a ``unit`` that begins with ``rows`` (WORLD + SEEN,), those of its world where an episode begins.
 
-    The target, the setpoints and the hand of the scenario are left out: they are the model's inputs.
+    The target, the setpoints and the hand of the scenario are left out: they are inputs.
     """
-    every = {**world.parts, **({"law": law} if law else {})}
-    parts = [every[name] for name in (_LOOP if law else _PLANT) if name in every]
-    functions = sorted({function_name(stage) for part in parts for stage in part.stages})
-    image = packed_image(packed_rows(world.rows, parts), [packed_part(part, functions) for part in parts])
-    inputs = [*_rows(_REFERENCE if law else _OPENINGS), *_rows(_FORCES)]
-    outputs = [row for one in (*_TRUTH, *_MEASURED, *((_OPENINGS,) if law else ())) for row in _rows(one)]
+    functions = sorted({function_name(stage) for part in unit.parts for stage in part.stages})
+    image = packed_image(packed_rows(rows, unit.parts), [packed_part(part, functions) for part in unit.parts])
     start = image.view(np.float64)[HEAD:]
     variables = (
         Variable("time", "independent", "s", "simulated time"),
-        *(_parameter(name, rig) for name in parameter_names(rig)),
-        *(_variable(row, "input", start) for row in inputs),
-        *(_variable(row, "output", start) for row in outputs),
+        *(_parameter(name, rig) for name in unit.parameters),
+        *(_input(one, start) for one in unit.inputs),
+        *(Variable(row.name, "output", row.unit, row.about) for row in unit.outputs),
     )
     period = rig.electronics.control_period
     token = sha256(repr((identifier, variables, period, functions, image.tobytes())).encode()).hexdigest()[:32]
     description = Description(identifier, identifier.replace("_", " "), about, token, period, variables)
-    return Model(functions, image, _header(description, [*inputs, *outputs], image, rig), description)
-
-
-def _rows(numbers: Sequence[int]) -> list[Row]:
-    return [row for row in LAYOUT if row.number in numbers]
+    derived = derived_parameters(rig) if unit.parameters else []
+    places = [*(one.row for one in unit.inputs), *unit.outputs]
+    return Model(functions, image, _header(description, places, image, derived), description)
 
 
 def _parameter(name: str, rig: Parameters) -> Variable:
@@ -75,16 +55,16 @@ def _parameter(name: str, rig: Parameters) -> Variable:
     return Variable(f"rig.{name}", "parameter", one.unit, one.about, value, float(least), float(one.most))
 
 
-def _variable(row: Row, causality: str, start: Array) -> Variable:
-    limit = 1.0 if row.number in _OPENINGS else _MOST_FORCE if row.number in _FORCES else math.inf
-    limit = limit if causality == "input" else math.inf
-    return Variable(row.name, causality, row.unit, row.about, float(start[row.number]), -limit, limit)
+def _input(one: Input, start: Array) -> Variable:
+    row = one.row
+    return Variable(row.name, "input", row.unit, row.about, float(start[row.number]), -one.most, one.most, one.sample)
 
 
-def _header(model: Description, rows: list[Row], image: Words, rig: Parameters) -> str:
+def _header(model: Description, rows: list[Row], image: Words, derived: list[str]) -> str:
     """``model.h`` for ``instance.h``."""
     of = {kind: [one for one in model.variables if one.causality == kind] for kind in ("parameter", "input", "output")}
-    bounded = [*of["parameter"], *of["input"]]
+    bounded = [(math.nan, math.nan) if one.is_sample else (one.least, one.most) for one in (*of["parameter"], *of["input"])]
+    starts = [*(one.start for one in of["parameter"]), 0.0]  # and a zero, since C has no empty arrays
     changing = ", ".join(f"{{{first}, {last}}}" for first, last in changing_words(image))
     lines = [
         "/* Generated by birthsim export. */",
@@ -97,16 +77,16 @@ def _header(model: Description, rows: list[Row], image: Words, rig: Parameters) 
         f"#define MODEL_OUTPUTS {len(of['output'])}",
         "#define MODEL_VARIABLES (1 + MODEL_PARAMETERS + MODEL_INPUTS + MODEL_OUTPUTS)",
         f"static const int model_place[] = {{{', '.join(str(HEAD + row.number) for row in rows)}}};",
-        f"static const double model_default_parameters[] = {{{_numbers(one.start for one in of['parameter'])}}};",
-        f"static const double model_least[] = {{{_numbers(one.least for one in bounded)}}};",
-        f"static const double model_most[] = {{{_numbers(one.most for one in bounded)}}};",
+        f"static const double model_default_parameters[] = {{{_numbers(starts)}}};",
+        f"static const double model_least[] = {{{_numbers(least for least, _ in bounded)}}};",
+        f"static const double model_most[] = {{{_numbers(most for _, most in bounded)}}};",
         f"static const int model_changing[][2] = {{{changing}}};",
         "extern const int64_t birthsim_image[];",
         "extern int32_t birthsim_advance(int64_t *image, int32_t periods);",
         "static void model_start(double *memory) { memcpy(memory, birthsim_image, sizeof(double) * MODEL_MEMORY); }",
         "static int32_t model_run(double *memory, int32_t periods) { return birthsim_advance((int64_t *)memory, periods); }",
         "static void model_derive(const double *p, double *memory) {",
-        *(f"  memory[{HEAD + row}] = {term};" for row, term in enumerate(derived_parameters(rig))),
+        *(f"  memory[{HEAD + row}] = {term};" for row, term in enumerate(derived)),
         "}",
         "",
     ]
@@ -115,4 +95,5 @@ def _header(model: Description, rows: list[Row], image: Words, rig: Parameters) 
 
 
 def _numbers(values: Any) -> str:
-    return ", ".join({math.inf: "INFINITY", -math.inf: "-INFINITY"}.get(value, repr(value)) for value in values)
+    words = {"inf": "INFINITY", "-inf": "-INFINITY", "nan": "NAN"}
+    return ", ".join(words.get(text, text) for text in map(repr, values))

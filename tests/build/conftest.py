@@ -3,6 +3,7 @@ import os
 import pytest
 from filelock import FileLock
 
+from birthsim.exports import fmu
 from birthsim_build.code.targets import HOST
 from birthsim_build.device import machine
 from birthsim_build.device.program import Pieces
@@ -56,3 +57,34 @@ def in_node(wasm, tmp_path):
     """Rows of a built loop in JavaScript; ``make`` is a method of ``Bundle`` and its arguments."""
     need_program("node", "nodejs")
     return lambda name, *make, **options: node_rows(wasm, list(make), tmp_path, PERIODS, **options)[0]
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory):
+    """Writes an FMU of some options, once."""
+    need_linker()
+    folder, made = tmp_path_factory.mktemp("fmu"), {}
+
+    def write(*options):
+        if options not in made:
+            build("fmu", folder / f"{len(made)}.fmu", *options, command=fmu)
+            made[options] = folder / f"{len(made)}.fmu"
+        return made[options]
+
+    return write
+
+
+@pytest.fixture
+def unit():
+    """Makes instances of FMUs."""
+    from tests.build.fmus import Unit  # needs FMPy
+
+    made = []
+
+    def make(path, **parameters):
+        made.append(Unit(path, **parameters))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()

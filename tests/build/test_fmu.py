@@ -12,84 +12,22 @@ import numpy as np
 import pytest
 
 from baselines.named import make_controller
-from birthsim.exports import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.description import exponents
 from birthsim_env import Parameters, Plant
 from birthsim_env.loop.rows import FORCE, STATE
-from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATE_NAMES, parameter_column
 from birthsim_env.physics.rig.parameters import DECLARED, load_parameters, value_of
-from tests.build.targets import build, imported, need_linker
+from tests.build.fmus import FORCES, OPENINGS, PERIOD, REFERENCE, fmpy
+from tests.build.targets import imported
 from tests.console import ROOT
 
-fmpy, validate_fmu = imported("fmpy"), imported("fmpy.validation").validate_fmu
+validate_fmu = imported("fmpy.validation").validate_fmu
 
-RIG, PERIOD = Parameters(), 1e-3
-OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
+RIG = Parameters()
 CIRCLE = "BirthSIM/Circle-v2"
 HEADERS = Path(archive.__file__).parent / "fmi_headers"
-
-
-class Unit:
-    """An instance of an FMU, by FMPy, where a simulation begins: variables by their names."""
-
-    def __init__(self, path, **parameters):
-        about = fmpy.read_model_description(path)
-        self._numbers = {variable.name: variable.valueReference for variable in about.modelVariables}
-        self.folder, self.ticks = fmpy.extract(path), 0
-        self.two = about.fmiVersion == "2.0"
-        self.unit = fmpy.instantiate_fmu(self.folder, about, "CoSimulation")
-        if self.two:
-            self.unit.setupExperiment(startTime=0.0)
-        self.unit.enterInitializationMode()
-        self.set(list(parameters), list(parameters.values()))
-        self.unit.exitInitializationMode()
-
-    def get(self, names):
-        return np.array((self.unit.getReal if self.two else self.unit.getFloat64)([self._numbers[name] for name in names]))
-
-    def set(self, names, values):
-        if names:
-            set_all = self.unit.setReal if self.two else self.unit.setFloat64
-            set_all([self._numbers[name] for name in names], [float(value) for value in values])
-
-    def step(self, periods=1):
-        self.unit.doStep(currentCommunicationPoint=self.ticks * PERIOD, communicationStepSize=periods * PERIOD)
-        self.ticks += periods
-
-    def close(self):
-        self.unit.terminate()
-        self.unit.freeInstance()
-        shutil.rmtree(self.folder)
-
-
-@pytest.fixture
-def unit():
-    made = []
-
-    def make(path, **parameters):
-        made.append(Unit(path, **parameters))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.close()
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    need_linker()
-    folder, made = tmp_path_factory.mktemp("fmu"), {}
-
-    def write(*options):
-        if options not in made:
-            build("fmu", folder / f"{len(made)}.fmu", *options, command=fmu)
-            made[options] = folder / f"{len(made)}.fmu"
-        return made[options]
-
-    return write
 
 
 @pytest.mark.parametrize("options", [(), ("--controller", "backstepping", "--sensors", "lab")], ids=["plant", "loop"])
@@ -134,10 +72,9 @@ def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, 
     env.reset(seed=0)
     simulation = env.unwrapped.simulation
     law = make_controller(controller, rig)
-    references = [f"reference_{name}" for name in REFERENCE_NAMES]
     for _ in range(periods):
         reference, seen = simulation.reference, simulation.measurement
-        one.set(references + FORCES, [*reference.rows[:, 0], *simulation.rows()[0][FORCE : FORCE + 2, 0]])
+        one.set(REFERENCE + FORCES, [*reference.rows[:, 0], *simulation.rows()[0][FORCE : FORCE + 2, 0]])
         one.step()
         env.step(law.command(seen, reference).T)
         assert one.get(["measured_x", "measured_y"]).tolist() == seen.position[:, 0].tolist()

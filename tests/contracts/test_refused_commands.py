@@ -54,6 +54,8 @@ TABLE = {
     "export --to fmu --out x.zip": "--out 'x.zip'; allowed: a file that ends in .fmu",
     "export --to fmu --controller shut-valves --out x.fmu": f"controller = 'shut-valves'; {COMPILED},",
     "export --to fmu --controller pid --policy circle --out x.fmu": "--controller with --policy; allowed: one of them",
+    "export --to fmu --alone --out x.fmu": "--alone without a controller; allowed: with --controller or --policy",
+    "export --to fmu --valves one_valve --out x.fmu": "--valves without a controller; allowed: with --controller or --policy",
     "export --to fmu --env BirthSIM/Square-v1 --out x.fmu": "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v2",
     **dict.fromkeys(("evaluate", "figure4", "animate", "train"), "--out"),
     "tune": "--controller",

@@ -14,7 +14,7 @@ enum { SETTING_UP, INITIALIZING, RUNNING, OVER };
 #define BEGIN "no initialization has begun"
 
 typedef struct {
-  double parameters[MODEL_PARAMETERS];
+  double parameters[MODEL_PARAMETERS + 1];
   double memory[MODEL_MEMORY];
   double began, time; /* s */
   long long periods;  /* control periods that are complete */
@@ -50,19 +50,19 @@ static double *model_variable(Model *m, unsigned k) {
   return k < MODEL_VARIABLES ? &m->memory[model_place[k - 1 - MODEL_PARAMETERS]] : NULL;
 }
 
+/* Whether parameter or input k, counted from 0, may have this value: any where its limits are no numbers, as of a sensor's
+   sample, which may be missing. */
+static int model_takes(int k, double value) {
+  return isnan(model_least[k]) || (isfinite(value) && value >= model_least[k] && value <= model_most[k]);
+}
+
 /* NULL, or why variable k must not become value now. */
 static const char *model_refusal(const Model *m, unsigned k, double value) {
   if (k == 0 || k >= MODEL_VARIABLES || k > MODEL_PARAMETERS + MODEL_INPUTS) return "only parameters and inputs can be set";
   if (m->state == OVER) return "the simulation is over; reset it first";
   if (k <= MODEL_PARAMETERS && m->state >= RUNNING) return "parameters can be set before the simulation begins";
-  if (!isfinite(value) || value < model_least[k - 1] || value > model_most[k - 1]) return "the value is outside of its limits";
+  if (!model_takes((int)k - 1, value)) return "the value is outside of its limits";
   return NULL;
-}
-
-static int model_is_within(const double *values, int first, int count) {
-  for (int k = 0; k < count; k++)
-    if (!(values[k] >= model_least[first + k] && values[k] <= model_most[first + k])) return 0;
-  return 1;
 }
 
 /* NULL, or why m, read from bytes, is no state of this model. By words that no step changes code jumps and indexes. */
@@ -76,10 +76,10 @@ static const char *model_damage(const Model *m) {
   }
   if (m->state < SETTING_UP || m->state > OVER || m->periods < 0 || !isfinite(m->began) || !isfinite(m->time))
     return "the bytes are damaged: there is no such time or state";
-  double inputs[MODEL_INPUTS];
-  for (int k = 0; k < MODEL_INPUTS; k++) inputs[k] = m->memory[model_place[k]];
-  if (!model_is_within(m->parameters, 0, MODEL_PARAMETERS) || !model_is_within(inputs, MODEL_PARAMETERS, MODEL_INPUTS))
-    return "the bytes are damaged: a value is outside of its limits";
+  for (int k = 0; k < MODEL_PARAMETERS + MODEL_INPUTS; k++) {
+    double value = k < MODEL_PARAMETERS ? m->parameters[k] : m->memory[model_place[k - MODEL_PARAMETERS]];
+    if (!model_takes(k, value)) return "the bytes are damaged: a value is outside of its limits";
+  }
   return NULL;
 }
 
