@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from birthsim_build.bundle import Bundle
+from birthsim_build.bundle import LAW, Bundle
 from birthsim_build.code.compiler import EMULATIONS, compile_object, link
 from birthsim_build.code.elf import sections_of, undefined_in
 from birthsim_build.code.ptx import assemble
@@ -13,7 +13,7 @@ from birthsim_build.code.stack import stack_bytes
 from birthsim_build.code.threads import Threads
 from birthsim_build.device.export import write_programs
 from birthsim_build.estimate import estimates
-from birthsim_build.faces.c import write_example, write_header, write_kernels
+from birthsim_build.faces.c import write_examples, write_header, write_kernels
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
@@ -47,7 +47,7 @@ def build_wasm(bundle: Bundle, folder: Path) -> Report:
 
 
 def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
-    """Write a shared library for Linux, the object that it is made of, the header and an example; returns sizes in bytes."""
+    """Write a shared library for Linux, the object that it is made of, the header and examples; returns sizes in bytes."""
     images = bundle.images()
     built = _object(bundle, target, folder, images)
     link(
@@ -61,18 +61,17 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
         str(folder / "libbirthsim.so"),
         str(folder / "birthsim.o"),
     )
-    loops = [name for name in images if name != "plant" and not name.startswith("law_")]
-    write_header(images, folder, next(iter(loops), None))
-    if loops:
-        write_example(folder)
+    write_header(images, bundle.rig.electronics.control_period, folder)
+    write_examples(images, folder)
     return {"target": target, "library": (folder / "libbirthsim.so").stat().st_size, **built}
 
 
 def build_cortex(bundle: Bundle, folder: Path) -> Report:
-    """Write the object of the laws alone and its header; returns sizes in bytes, and what a period takes."""
-    images = {name: words for name, words in bundle.images().items() if name.startswith("law_")}
+    """Write the object of the laws alone, its header and an example; returns sizes in bytes, and what a period takes."""
+    images = {name: words for name, words in bundle.images().items() if name.startswith(LAW)}
     built = _object(bundle, "cortex-m7", folder, images)
-    write_header(images, folder)
+    write_header(images, bundle.rig.electronics.control_period, folder)
+    write_examples(images, folder, linked=False)
     assembly = folder / "birthsim.s"
     stack = stack_bytes(assembly.read_text(), "birthsim_advance", "birthsim_stage_")
     assembly.unlink()

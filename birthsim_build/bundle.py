@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 from baselines.controller import RESIDUAL
 from birthsim_build.image import Part, Words, function_name
-from birthsim_build.loops import PAIRED_VALVES, World, image_of, law_part, plant_world, scenario_world
+from birthsim_build.loops import PAIRED_VALVES, World, alone_rows, image_of, law_part, plant_world, scenario_world
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import entry, names
+
+LAW, PLANT = "law_", "plant"
+"""How names of controllers alone begin, and the name of the plant alone; all others are closed loops."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +36,9 @@ class Bundle:
     def images(self) -> dict[str, Words]:
         """Every closed loop, every law alone and the plant alone as images, by names that C takes."""
         functions = self.functions
-        named = {} if self.plant is None else {"plant": image_of(self.plant.rows, self.plant.parts, functions)}
+        named = {} if self.plant is None else {PLANT: image_of(self.plant.rows, self.plant.parts, functions)}
         for (controller, sampled), law in self.laws.items():
-            named[f"law_{identifier(controller)}_{'sampled' if sampled else 'exact'}"] = image_of(None, {"law": law}, functions)
+            named[law_name(controller, sampled)] = image_of(alone_rows(self.rig), {"law": law}, functions)
         for (scenario, sensors), world in self.worlds.items():
             for (controller, sampled), law in self.laws.items():
                 if sampled == world.sampled:
@@ -53,6 +56,11 @@ def identifier(name: str) -> str:
 def loop_name(scenario: str, sensors: str, controller: str) -> str:
     """The name of a closed loop as C takes it."""
     return "_".join(map(identifier, (scenario, sensors, controller)))
+
+
+def law_name(controller: str, sampled: bool) -> str:
+    """The name of a controller alone as C takes it."""
+    return f"{LAW}{identifier(controller)}_{'sampled' if sampled else 'exact'}"
 
 
 def scenario_of(environment: str) -> str:

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_build.bundle import Bundle, identifier, make_bundle
+from birthsim_build.bundle import Bundle, law_name, loop_name, make_bundle
 from birthsim_build.code.compiler import EMULATIONS, compile_object, has_linker, link
 from birthsim_build.code.counting import COUNTS, OPERATIONS
 from birthsim_build.code.targets import HOST
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import ROWS
 from birthsim_env.loop.rows import ASKED, WORLD
+from birthsim_env.parts.scenarios import scenarios_for
 from birthsim_env.physics.compiled.lanes import Array
 
 CYCLES = {
@@ -37,7 +38,8 @@ def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:
     if HOST is None or not has_linker():
         return {}
     kinds = {sampled: "lab" if sampled else "ideal" for _, sampled in bundle.laws}
-    whole = make_bundle(bundle.rig, ["circle"], kinds.values(), ())
+    scenario = scenarios_for(bundle.rig)[0]
+    whole = make_bundle(bundle.rig, [scenario], kinds.values(), ())
     whole = Bundle(bundle.rig, whole.worlds, bundle.laws, None)
     images = whole.images()
     with tempfile.TemporaryDirectory() as folder:
@@ -47,9 +49,8 @@ def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:
         code: Any = ctypes.CDLL(str(library))
     found = {}
     for controller, sampled in bundle.laws:
-        name = identifier(controller)
-        seen = _seen(code, images[f"circle_{kinds[sampled]}_{name}"])
-        law = f"law_{name}_{'sampled' if sampled else 'exact'}"
+        law = law_name(controller, sampled)
+        seen = _seen(code, images[loop_name(scenario, kinds[sampled], controller)])
         counts = _counted(code, images[law], seen)
         cycles = counts @ np.array([CYCLES[kind] for kind in OPERATIONS])
         operations = float(counts.sum(axis=1).mean())

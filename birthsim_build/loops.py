@@ -12,10 +12,10 @@ from baselines.staged import StagedController
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
 from birthsim_build.stages import enter_scenario, outside, pair_valves
 from birthsim_env.loop import pipeline
-from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, SEEN, STATE, WORLD
+from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, PRESSURE, SEEN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import guide_stage, plant_stage
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.lanes import PARAMETERS, PRESSURES, STATES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -94,6 +94,17 @@ def staged_part(law: StagedController, sampled: bool) -> Part:
     return Part(tuple(cast(list[Stage], law.stages())), rows)
 
 
+def alone_rows(rig: Parameters) -> Array:
+    """Rows (WORLD + SEEN,) of a controller alone before anything is measured: zeros, but of the cells that a rail lacks.
+
+    Laws read those all the same: they show what is in the idle cylinder, whose valves are shut.
+    """
+    rows, state = np.zeros(WORLD + SEEN), Plant(rig).state[:, 0]
+    for chamber in {*range(len(PRESSURES))} - {*rig.linkage.topology.chambers}:
+        rows[WORLD + PRESSURE + chamber] = state[PRESSURES[chamber]]
+    return rows
+
+
 def plant_world(rig: Parameters) -> World:
     """The plant alone: at mid stroke, at rest, with pressures that balance the weight; from openings and the hand's force."""
     plant, period = Plant(rig), rig.electronics.control_period
@@ -103,7 +114,7 @@ def plant_world(rig: Parameters) -> World:
     return World(rows, {"plant": Part((plant_stage(plant.lane_parameters, plant.memory, period),), {})}, False)
 
 
-def image_of(rows: Array | None, parts: Mapping[str, Part], functions: Sequence[str]) -> Words:
+def image_of(rows: Array, parts: Mapping[str, Part], functions: Sequence[str]) -> Words:
     """The image of a loop of ``parts``, run in the order of ``ORDER``; ``functions`` are those of the code."""
     several = [parts[name] for name in ORDER if name in parts]
     return packed_image(packed_rows(rows, several), [packed_part(part, functions) for part in several])

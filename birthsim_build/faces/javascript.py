@@ -6,7 +6,7 @@ from typing import Any
 from birthsim_build.bundle import Bundle
 from birthsim_build.faces.module import HERE, Store, described, write_module
 from birthsim_build.layout import LAYOUT
-from birthsim_build.loops import ORDER, PAIRED_VALVES
+from birthsim_build.loops import ORDER, PAIRED_VALVES, alone_rows
 from birthsim_env.parts.scenarios import find_scenario
 from birthsim_env.registry import entries
 
@@ -41,7 +41,7 @@ def _index(bundle: Bundle, store: Store) -> dict[str, Any]:
     return {
         "period": bundle.rig.electronics.control_period, "order": list(ORDER), "scenarios": scenarios,
         "sensors": {kind.name: kind.made.sampled for kind in entries("sensors")}, "controllers": controllers, "plant": plant,
-        "one_valve": number(PAIRED_VALVES), "zero": begins(None), "parts": store.parts,
+        "one_valve": number(PAIRED_VALVES), "zero": begins(alone_rows(bundle.rig)), "parts": store.parts,
     }  # fmt: skip
 
 

@@ -8,11 +8,13 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from birthsim_build.fmu.clock import clock_stage
 from birthsim_build.fmu.derived_parameters import parameter_names
 from birthsim_build.image import Part
 from birthsim_build.layout import LAYOUT, Row
-from birthsim_build.loops import World
+from birthsim_build.loops import World, alone_rows
 from birthsim_env.loop import guard
 from birthsim_env.loop.rows import (
     FAULT,
@@ -20,7 +22,6 @@ from birthsim_env.loop.rows import (
     MOTION,
     OPENING,
     POSITION,
-    PRESSURE,
     REFERENCE,
     SEEN,
     SHOWN,
@@ -29,7 +30,7 @@ from birthsim_env.loop.rows import (
     Signals,
 )
 from birthsim_env.loop.signals import REFERENCES
-from birthsim_env.physics.compiled.lanes import PRESSURES, STATES
+from birthsim_env.physics.compiled.lanes import STATES
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.topology import Topology
 
@@ -97,8 +98,8 @@ def controller_unit(world: World, laws: dict[str, Part], rig: Parameters) -> Uni
     Nothing of it is derived from the rig's parameters any more, so that it has none. Cells that a rail lacks, which laws read
     all the same, show what is in its idle cylinder.
     """
-    idle = {*range(len(PRESSURES))} - {*rig.linkage.topology.chambers}
-    cells = {WORLD + PRESSURE + k: float(world.rows[STATE + PRESSURES[k]]) for k in sorted(idle)}
+    idle = alone_rows(rig)
+    cells = {number: float(idle[number]) for number in np.flatnonzero(idle).tolist()}
     clock = Part((clock_stage(rig.electronics.control_period, world.sampled),), cells)
     measured = [Input(row, sample=True) for row in _rows(_read(laws["law"], world.sampled), rig)]
     opened = _FILLING if "valves" in laws else _OPENINGS
