@@ -85,6 +85,6 @@ def main(settings: Settings) -> None:
     print(f"written to {settings.out}: {settings.out.stat().st_size:,} bytes, FMI {settings.fmi}, {counts}")
 
 
-register(export="fmu", about="the rig, a closed loop or a controller alone, for Simulink and its like", order=30)(
+register(export="fmu", about="the rig, a closed loop or a controller alone, for Simulink", order=30)(
     Form(Settings, main, "--out rig.fmu")
 )

@@ -12,7 +12,7 @@ from birthsim_env.loop.rows import ASKED, FORCE, OPENING, POSITION, REFERENCE, S
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import STATE_NAMES
 from birthsim_env.physics.rig.parameters import load_parameters
-from lab.studies.targets.reference import whole_rows
+from lab.studies.targets.reference import PERIODS, whole_rows
 from lab.studies.targets.running import ROW
 from tests.build import fmus
 from tests.build.fmus import FORCES, OPENINGS, PERIOD, fmpy
@@ -68,20 +68,20 @@ def commanded(law, rows, sampled, rig=None):
 
 
 @pytest.mark.parametrize(
-    ("sensors", "law", "options", "periods"),
+    ("sensors", "law", "options"),
     [
-        ("ideal", "backstepping", BACKSTEPPING, 15_990),
-        ("ideal", "admittance-adaptive", ADAPTIVE, 2000),
-        ("lab", "residual:circle", ("--policy", "circle", "--sensors", "lab"), 2000),
+        ("ideal", "backstepping", BACKSTEPPING),
+        ("ideal", "admittance-adaptive", ADAPTIVE),
+        ("lab", "residual:circle", ("--policy", "circle", "--sensors", "lab")),
     ],
 )
-def test_the_openings_are_those_of_python(written, unit, sensors, law, options, periods):
+def test_the_openings_are_those_of_python(written, unit, sensors, law, options):
     """Over what they measure in Python's closed loop."""
-    one, rows = unit(alone(written, *options)), whole_rows("circle", sensors, law, periods)
+    one, rows = unit(alone(written, *options)), whole_rows("circle", sensors, law, PERIODS)
     expected = commanded(law, rows, sensors == "lab")
     assert np.ptp(expected[:, :4], axis=0).min() > 0.1
     assert (expected[:, 4:] == 0.0).all()
-    assert_same_bits(answers(one, rows, periods), expected)
+    assert_same_bits(answers(one, rows, PERIODS), expected)
 
 
 @pytest.mark.parametrize("law", ["abry", "abry-one-valve"])
@@ -94,12 +94,12 @@ def test_a_rail_has_two_openings_and_with_a_5_3_valve_one(written, unit, law):
     valves = ("--valves", "one_valve") if law == "abry-one-valve" else ()
     one = unit(alone(written, "--controller", law, "--env", environment, *told, *valves))
     assert one.outputs == [*(["opening_P2"] if valves else OPENINGS[2:]), *ENDED]
-    rows = whole_rows("rail-steps", "encoders", law, 2000, rig=rig, parameters=rig)
+    rows = whole_rows("rail-steps", "encoders", law, PERIODS, rig=rig, parameters=rig)
     # Cells in the idle cylinder, which Python's rail has, are noisy; the unit has none.
     rows[:, [ROW[name] for name in PRESSURES[:2]]] = rows[:, [ROW["Pp1"], ROW["Pn1"]]]
     expected = commanded(law, rows, True, rig)
     assert np.ptp(expected[:, 2:4], axis=0).min() > 0.1
-    assert_same_bits(answers(one, rows, 2000), expected[:, [2, 4, 5] if valves else [2, 3, 4, 5]])
+    assert_same_bits(answers(one, rows, PERIODS), expected[:, [2, 4, 5] if valves else [2, 3, 4, 5]])
 
 
 def test_missing_samples_are_replaced_and_an_outage_ends_the_control(written, unit):
@@ -153,8 +153,8 @@ def test_a_state_with_a_missing_sample_comes_back(written, unit):
     ("sensors", "options", "periods"),
     [
         ("ideal", BACKSTEPPING, 15_990),
-        ("ideal", ADAPTIVE, 2000),
-        pytest.param("lab", BACKSTEPPING, 2000, marks=pytest.mark.slow),
+        ("ideal", ADAPTIVE, PERIODS),
+        pytest.param("lab", BACKSTEPPING, PERIODS, marks=pytest.mark.slow),
     ],
 )
 def test_with_the_plants_unit_it_is_the_closed_loop_of_python(written, unit, sensors, options, periods):

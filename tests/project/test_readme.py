@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from tests.build.targets import imported, need_linker
 from tests.console import ROOT
 
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
@@ -30,6 +31,9 @@ TRAINS = {name for name, block in BLOCKS.items() if ".learn(" in block}
 def test_python_blocks_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(ROOT / "examples")
+    if "fmpy" in BLOCKS[name]:
+        need_linker()
+        imported("fmpy")
     names = {}
     exec(compile(BLOCKS[name], name, "exec"), names)
     if "env" in names:
