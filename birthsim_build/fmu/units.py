@@ -121,10 +121,13 @@ def _parts(world: World, laws: dict[str, Part], order: Sequence[str]) -> list[Pa
     return [every[name] for name in order if name in every]
 
 
+_BY_NUMBER = {row.number: row for row in LAYOUT}
+
+
 def _rows(numbers: Iterable[int], rig: Parameters) -> list[Row]:
-    """Rows by their numbers, in the order of all, without those of a cylinder that does not move."""
-    wanted = set(numbers)
-    return [row for row in LAYOUT if row.number in wanted and _moves(row.name, rig.linkage.topology)]
+    """Rows by their numbers, without those of a cylinder that does not move."""
+    rows = [_BY_NUMBER[number] for number in numbers]
+    return [row for row in rows if _moves(row.name, rig.linkage.topology)]
 
 
 def _moves(name: str, topology: Topology) -> bool:

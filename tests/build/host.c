@@ -1,10 +1,9 @@
-/* Loads nothing: linked with the binary of an FMU (FMI 2.0), it runs 400 periods and prints the bits of every output. */
+/* Loads nothing: linked with the binary of an FMU (FMI 2.0), it runs 400 periods and prints the bits of every output.
+   Compiled with the number of OUTPUTS, and with the value references of the first of them, FIRST, and of force_x, FORCE. */
 #include <stdio.h>
 #include <string.h>
 
 #include "fmi2Functions.h"
-
-enum { PARAMETERS = 35, INPUTS = 17, OUTPUTS = 37, FORCE = 1 + PARAMETERS + 15 };
 
 int main(int count, char **given) {
   fmi2Component c = count == 2 ? fmi2Instantiate("one", fmi2CoSimulation, given[1], "", NULL, 0, 0) : NULL;
@@ -13,7 +12,7 @@ int main(int count, char **given) {
   fmi2EnterInitializationMode(c);
   fmi2ExitInitializationMode(c);
   fmi2ValueReference out[OUTPUTS], in[2] = {FORCE, FORCE + 1};
-  for (int k = 0; k < OUTPUTS; k++) out[k] = 1 + PARAMETERS + INPUTS + k;
+  for (int k = 0; k < OUTPUTS; k++) out[k] = FIRST + k;
   for (int k = 0; k < 400; k++) {
     double values[OUTPUTS], force[2] = {(k % 50) / 4.0, -(k % 30) / 3.0};
     unsigned long long bits[OUTPUTS];

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.named import compiled_names, make_controller
-from birthsim_build.fmu.units import controller_unit
+from birthsim_build.fmu.units import controller_unit, loop_unit, plant_unit
 from birthsim_build.loops import PAIRED_VALVES, law_part, scenario_world
 from birthsim_env import Parameters, Reference
 from birthsim_env.ids import rig_for
@@ -204,6 +204,20 @@ def test_a_rail_has_nothing_of_cylinder_1_and_a_5_3_valve_one_opening():
     assert interface("rail", "ideal", "abry") == (inputs, [*OPENINGS[2:], *ENDED])
     assert interface("rail", "ideal", "abry-one-valve", one_valve=True) == (inputs, ["opening_P2", *ENDED])
     assert interface("circle", "ideal", "backstepping", one_valve=True)[1] == ["opening_P1", "opening_P2", *ENDED]
+
+
+def test_units_of_a_rail_fit_together():
+    """The plant's and the closed loop's have nothing of cylinder 1 either."""
+    environment = environment_id("rail")
+    rig = rig_for(environment, None)
+    world = scenario_world(environment, "ideal", rig)
+    plant, loop = plant_unit(world, rig), loop_unit(world, {"law": law_part("abry", rig, False)}, rig)
+    assert [one.row.name for one in plant.inputs] == [*OPENINGS[2:], *FORCES]
+    assert [one.row.name for one in loop.inputs] == [*(name for name in fmus.REFERENCE if "1" not in name), *FORCES]
+    shown = [name for name in STATE_NAMES if "1" not in name] + ["x", "y", "vx", "vy", *POSITIONS, *VELOCITIES]
+    shown += ["position_time", "measured_ax", "measured_ay", *PRESSURES[2:], *FELT]
+    assert [row.name for row in plant.outputs] == shown
+    assert [row.name for row in loop.outputs] == [*shown, *OPENINGS[2:]]
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])

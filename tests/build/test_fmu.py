@@ -87,15 +87,18 @@ def test_windows_computes_the_bits_of_linux(written, tmp_path):
     path = written("--controller", "backstepping", "--sensors", "lab", "--target", "x86-64", "x86-64-windows")
     about, unpacked = fmpy.read_model_description(path), Path(fmpy.extract(path, tmp_path / "fmu"))
     (linux,), (windows,) = (unpacked / "binaries" / "linux64").iterdir(), (unpacked / "binaries" / "win64").iterdir()
-    printed = []
+    printed, numbers = [], {one.name: one.valueReference for one in about.modelVariables}
+    outputs = [one.valueReference for one in about.modelVariables if one.causality == "output"]
+    counts = [f"-DOUTPUTS={len(outputs)}", f"-DFIRST={outputs[0]}", f"-DFORCE={numbers['force_x']}"]
     for target, library, host in (("x86_64-linux-gnu", linux, []), ("x86_64-windows-gnu", windows, ["wine"])):
         folder = library.parent
-        line = [sys.executable, "-m", "ziglang", "cc", "-target", target, f"-I{HEADERS}", Path(__file__).parent / "host.c"]
+        compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
+        line = [*compiler, f"-I{HEADERS}", *counts, Path(__file__).parent / "host.c"]
         subprocess.run([*line, library, f"-Wl,-rpath,{folder}", "-o", folder / "host.exe"], check=True)
         quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(tmp_path / "wine")}
         done = subprocess.run([*host, folder / "host.exe", about.guid], cwd=folder, env=quiet, capture_output=True, check=True)
         printed.append(done.stdout.split())
-    assert len(printed[0]) == 400 * 37
+    assert len(printed[0]) == 400 * len(outputs)
     assert printed[0] == printed[1]
 
 
