@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from baselines.bench.evaluation import Evaluation as Evaluation
     from baselines.bench.evaluation import evaluate as evaluate
     from baselines.controller import Controller as Controller
+    from baselines.identification.comparing.compared import Comparison as Comparison
     from baselines.identification.identified import Identified as Identified
     from baselines.named import make_controller as make_controller
     from baselines.staged import ControllerStage as ControllerStage
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from birthsim.envs import make as make
     from birthsim.envs import make_vec as make_vec
     from birthsim.exporting import export as export
+    from birthsim.identification import compare as compare
     from birthsim.identification import identify as identify
     from birthsim.names import controllers as controllers
     from birthsim.names import policies as policies
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "Circle": "birthsim_env.parts.references",
+    "Comparison": "baselines.identification.comparing.compared",
     "Controller": "baselines.controller",
     "ControllerStage": "baselines.staged",
     "Evaluation": "baselines.bench.evaluation",
@@ -71,6 +74,7 @@ _PLACES = {
     "Trajectory": "birthsim_env.parts.references",
     "UserForce": "birthsim_env.parts.hands.user_forces",
     "balanced_pressures": "birthsim_env.gradients.linear.linearize",
+    "compare": "birthsim.identification",
     "controllers": "birthsim.names",
     "environments": "birthsim.envs",
     "evaluate": "baselines.bench.evaluation",

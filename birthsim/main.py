@@ -33,6 +33,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "tune": Command("a search for a controller's gains", "--controller pid --trials 75 --out out/tune"),
         "identify": Command("a laboratory's own rig, from its log", "log.csv --out rig.toml"),
+        "compare": Command("a log beside rigs: where each model leaves it", "log.csv --parameters rig.toml"),
         "study": Command("studies of the project, in a clone", "speed"),
     },
     "learn": {

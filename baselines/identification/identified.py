@@ -16,8 +16,9 @@ from baselines.identification.fit.problem import Tick
 from baselines.identification.log.log_columns import CHAMBERS
 from baselines.identification.log.trial import Trial
 from baselines.identification.windows.force_offset import ForceOffset, force_offset
-from baselines.identification.windows.noise import LEAST, guessed_noise, noise_of
+from baselines.identification.windows.noise import cell_noises, guessed_noise
 from baselines.identification.windows.starts import Noise
+from baselines.identification.windows.windows import check_begins
 from birthsim_env.files import write_text
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.compiled.lanes import Array
@@ -207,10 +208,6 @@ BIASED, LEAST_BIAS = 3.0, 5e3
 """Standard deviations and Pa from which the bias of a cell is named."""
 
 
-REMEMBER = ("mechanics.mode_frequency",)
-"""Options of a rig with states that no log holds at the start of a window."""
-
-
 def identify(
     trial: Trial,
     owner: Parameters,
@@ -225,11 +222,9 @@ def identify(
     ``friction_law`` the laws that the plant knows are compared (``laws``).
     Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
     of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
-    ``REMEMBER``.
+    ``windows.REMEMBER``.
     """
-    given = [name for name in REMEMBER if value_of(owner, name)]
-    if given:
-        raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
+    check_begins(owner, "an identification")
     asked = free_of(owner, trial.latency) if free is None else free
     whole, laws = fit_law(trial, owner, seed, asked, tick, friction_law)
     owner = owner.replace({LAW: laws.chosen})
@@ -280,7 +275,7 @@ def left_over(found: Fit, trial: Trial) -> Array:
     pressures = residual[:, : 4 * windows.length].reshape(len(residual), -1, 4) * found.problem.noise.pressure
     counted = np.sum(np.broadcast_to(windows.pressure_weights**2, pressures.shape), axis=(0, 1))
     sizes = np.sqrt(np.sum(pressures**2, axis=(0, 1)) / np.maximum(counted, 1.0))
-    return np.array([size / max(noise_of(own[None]), LEAST.pressure) for size, own in zip(sizes, trial.pressures, strict=True)])
+    return np.asarray(sizes / cell_noises(trial))
 
 
 def _latency(one: FreeParameter, period: float, middle: float, deviation: float) -> tuple[float, float, float]:

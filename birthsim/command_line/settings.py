@@ -9,9 +9,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
+
+if TYPE_CHECKING:
+    from baselines.identification.log.log_columns import LogOptions
 
 MOST = 10**9
 """Largest whole number that an option takes, where it has no lower limit of its own."""
@@ -132,6 +135,24 @@ class Configured:
             for name, value in vars(self).items()
             if name not in ("out", "jobs", "cluster", "config")
         }
+
+
+@dataclass(kw_only=True)
+class Logged(Configured):
+    """How a laboratory's log is read."""
+
+    columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
+    """What columns of the log are called, such as force_x=Fz,force_y=none; opening=u*0.2-1 of one in volts."""
+    skip: Annotated[int | None, whole(0)] = None
+    """Lines of the log before its heading, where it is not found by itself."""
+    decimal_comma: bool = False
+    """The log has decimal commas."""
+
+    def options(self) -> "LogOptions":
+        """The same for what reads logs."""
+        from baselines.identification.log.log_columns import LogOptions  # loads NumPy
+
+        return LogOptions(self.columns or "", self.skip, self.decimal_comma)
 
 
 @dataclass(kw_only=True)

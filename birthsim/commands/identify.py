@@ -13,12 +13,11 @@ from baselines.identification.experiment import DURATION, propose, read_plan, su
 from baselines.identification.fit.free_parameters import unmeasured
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.log.log_columns import LogOptions
 from baselines.identification.log.log_file import read_trial, write_trial
 from baselines.identification.valve_table import fit_valve_table
 from baselines.logs.writing import WRITERS
 from baselines.named import make_controller
-from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Configured, RigFile, Seed, number, whole
+from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Logged, RigFile, Seed, number
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
@@ -31,19 +30,13 @@ ONLY_WITH = {
 
 
 @dataclass(kw_only=True)
-class Settings(Configured):
+class Settings(Logged):
     r"""Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and write the rig as
     TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.
     """
 
     log: Annotated[Path | None, TABLE] = field(default=None, kw_only=False)
     """A table of time, openings, pressures, positions, forces; the endings below."""
-    columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
-    """What columns of the log are called, such as force_x=Fz,force_y=none; opening=u*0.2-1 of one in volts."""
-    skip: Annotated[int | None, whole(0)] = None
-    """Lines of the log before its heading, where it is not found by itself."""
-    decimal_comma: bool = False
-    """The log has decimal commas."""
     friction_law: Literal["lugre", "coulomb", "elasto_plastic", "gms"] | None = None
     """The friction law that is fitted, else the one that the log supports best."""
     propose: Annotated[Path | None, Parameter(metavar="PLAN")] = None
@@ -123,7 +116,7 @@ def _from_valve_table(settings: Settings, table: Path, rig: Parameters) -> None:
 
 def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
     out = _out(settings, (".toml",))
-    trial = read_trial(log, owner, LogOptions(settings.columns or "", settings.skip, settings.decimal_comma))
+    trial = read_trial(log, owner, settings.options())
     print("".join(f"{note}\n" for note in trial.notes), end="", flush=True)
     folder = None if settings.report is None else make_folder(settings.report)
     with _bar(None, "fit", "evaluations") as tick:

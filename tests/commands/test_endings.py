@@ -103,6 +103,7 @@ BUSY = {
     "evaluate --env BirthSIM/Probe-v3 --out out": "birthsim.evaluation.run_tasks",
     "animate --out out.webp": "birthsim.commands.animate.take",
     "identify log.csv --out rig.toml": "birthsim.commands.identify.read_trial",
+    "compare log.csv --out out": "birthsim.commands.compare.compare_log",
     "tune --controller pid --out out": "birthsim.commands.tune.costs",
 }
 """A command, and what it is doing when Ctrl-C comes."""

@@ -125,7 +125,7 @@ FILES = {
         *(lambda name, ending=ending: circle(reference=f"{name}{ending}") for ending in (".csv", ".py:Own")),
     ),
     "user_force": (lambda name: circle(user_force=f"{name}.csv"),),
-    "log": (lambda name: birthsim.identify(name, RIG),),
+    "log": (lambda name: birthsim.identify(name, RIG), lambda name: birthsim.compare(name, RIG)),
     "out": (lambda name: birthsim.export("fmu", out=f"{name}.txt"),),
     "environment": (birthsim.make,),
 }  # fmt: skip

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from baselines.identification.fit import budget
-from baselines.identification.identified import REMEMBER
 from baselines.identification.identified import identify as identify_trial
 from baselines.identification.log.log_file import write_trial
 from baselines.identification.log.trial import Trial
+from baselines.identification.windows.windows import REMEMBER
 from birthsim.commands import identify
 from birthsim_env.physics.rig.parameters import DECLARED, Parameters
 from tests.console import call

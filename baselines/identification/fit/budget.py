@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
 
 from baselines.identification.log.trial import Trial
 
@@ -22,6 +23,11 @@ class Budget:
     def of(trial: Trial) -> "Budget":
         """The budget of a trial."""
         return Budget(max(TIMES * float(trial.times[-1] - trial.times[0]), AT_LEAST))
+
+    @staticmethod
+    def endless() -> "Budget":
+        """One without an end, for what is predicted once."""
+        return Budget(inf)
 
     @contextmanager
     def part(self, share: float) -> Iterator[None]:

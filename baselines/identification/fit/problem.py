@@ -42,7 +42,7 @@ class Problem:
         self.centre, self.limits = coordinates(owner, free), limits(owner, free)
         self.spread: Array = np.array([one.prior.spread for one in free])
         self._start: Array = np.zeros((len(windows.starts), len(windows.free)))
-        self._at: tuple[bytes, Array, Array, Array]
+        self._at: tuple[bytes | None, Array, Array, Array]
         self._slopes: Slopes | None
         self._take(windows)
         self._columns = windows.length * 4 + windows.positions.shape[1] * 2 + len(windows.free)
@@ -104,7 +104,7 @@ class Problem:
 
     def _take(self, windows: Windows) -> None:
         self.windows, self.offsets = windows, Offsets(windows, self.noise, self._owner)
-        self._at, self._slopes = (b"", self._start, self._start, self._start), None
+        self._at, self._slopes = (None, self._start, self._start, self._start), None
 
     @contextmanager
     def explained(self) -> Iterator[None]:

@@ -38,6 +38,11 @@ def guessed_noise(trial: Trial) -> Noise:
     return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
 
 
+def cell_noises(trial: Trial) -> Array:
+    """Of each chamber's pressure, (4,), Pa, from third differences."""
+    return np.array([max(noise_of(own[None]), LEAST.pressure) for own in trial.pressures])
+
+
 def noise_of(values: Array) -> float:
     """RMS of the noise of values (C, N), NaN where there are none: of medians, which jumps do not move.
 

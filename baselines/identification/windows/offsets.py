@@ -40,7 +40,7 @@ class Offsets:
             moved = slopes_of(windows.positions, rig) * windows.trial.counted
             field = np.where(windows.valid[..., None, None], moved, 0.0).reshape(count, -1, 2)
         bias = np.tile(max(board.pressure_bias, LEAST) * np.eye(cells), (count, windows.length, 1))
-        self._windows, self._bias, self._field = windows, bias, field
+        self._windows, self._bias, self._field, self._board = windows, bias, field, board
         self._columns = np.zeros((count, bias.shape[1] + field.shape[1] + len(windows.free), cells + field.shape[2]))
         heard = windows.pressure_weights.reshape(count, -1, 1)
         seen = np.repeat(windows.position_weights, 2, axis=1)[..., None]
@@ -53,6 +53,29 @@ class Offsets:
         """What each pressure cell adds (4,), Pa."""
         return np.asarray(self._bias[0, :4] @ self.sizes[:4])
 
+    @property
+    def zeros(self) -> Array:
+        """What the zeros of both encoders are off (2,), m; empty where a tracker sees the head."""
+        known = self._windows.trial.counted
+        return np.empty(0) if known is None else np.asarray(self.sizes[4:] * known)
+
+    @property
+    def distortion(self) -> float:
+        """RMS of what a tracker's field moves the measured positions by, m, of one axis; 0 where encoders count them."""
+        if self._windows.trial.counted is not None:
+            return 0.0
+        moved = (self._field @ self.sizes[4:]).reshape(self._windows.positions.shape)[self._windows.valid]
+        return float(np.sqrt(np.mean(moved**2)))
+
+    def bound(self, times: float) -> bool:
+        """Make no error larger than so many ``times`` what is known of it before; whether one was."""
+        before, most = self.sizes, times * max(self._board.position_distortion, LEAST)
+        within = np.clip(before, -times, times)
+        if self._windows.trial.counted is None:
+            within[4:] = before[4:] * min(1.0, most / max(self.distortion, LEAST))
+        self.sizes = within
+        return not np.array_equal(before, within)
+
     def encoders(self, jacobian: Array, covariance: Array) -> tuple[Array, Array]:
         """What the zeros of both encoders are off (2,), m, and standard deviations (2,); none where a tracker sees the head.
 
@@ -63,7 +86,7 @@ class Offsets:
             return np.empty(0), np.empty(0)
         bent = jacobian[-len(self.sizes) :]
         every = np.diag(self._inverse + bent @ covariance @ bent.T)
-        return self.sizes[4:] * known, np.sqrt(every[4:]) * known
+        return self.zeros, np.sqrt(every[4:]) * known
 
     def corrected(self) -> Windows:
         """The windows as sensors without errors would have them."""

@@ -43,6 +43,9 @@ FREE = (at.Y1, at.V1, at.Y2, at.V2, at.Z1, at.Z2, at.PP1, at.PN1, at.PP2, at.PN2
 OF_CYLINDER_1 = (at.Y1, at.V1, at.Z1, at.PP1, at.PN1, at.TP1, at.TN1)
 """Those that stand still on a rail."""
 
+REMEMBER = ("mechanics.mode_frequency",)
+"""Options of a rig with states that no log holds at the start of a window."""
+
 SUPPLY, ENDS = at.STATES, tuple(range(at.STATES + 1, at.STATES + 5))
 """Further rows of the state of a rig with options: pressures of the supply and at the valves' ends of the four tubes."""
 
@@ -114,6 +117,13 @@ class Windows:
         )
 
 
+def check_begins(rig: Parameters, purpose: str) -> None:
+    """``ValueError`` for a rig with options that ``REMEMBER``."""
+    given = [name for name in REMEMBER if value_of(rig, name)]
+    if given:
+        raise ValueError(f"{given[0]} = {value_of(rig, given[0])!r}; allowed for {purpose}: 0, {', '.join(REMEMBER)}")
+
+
 def late(trial: Trial, rig: Parameters) -> float:
     """s by which the positions of a trial arrive late."""
     return float(value_of(rig, trial.latency))
@@ -129,26 +139,44 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH, budget: Budget | 
     fresh = fresh_rows(trial.positions)
     lag = round(late(trial, rig) / period)
     starts = _measured(trial, np.arange(margin, rows - margin - k, k), k, lag, fresh)
-    own = [fresh[(fresh >= start + lag) & (fresh < start + k + lag)] for start in starts]
+    state = _guess(trial, rig, starts, fresh)
+    return windows_at(trial, rig, starts, k, fresh, state, budget or Budget.of(trial))
+
+
+def windows_at(
+    trial: Trial,
+    rig: Parameters,
+    starts: NDArray[np.intp],
+    length: int,
+    fresh: NDArray[np.intp],
+    state: Array,
+    budget: Budget,
+) -> Windows:
+    """Windows of ``length`` rows of a trial that begin at rows ``starts`` (W,), in a ``state`` (S, W) or near it.
+
+    ``fresh`` are the rows at which a sample of the position arrives.
+    """
+    lag = round(late(trial, rig) / trial.period)
+    own = [fresh[(fresh >= start + lag) & (fresh < start + length + lag)] for start in starts]
     most = max(map(len, own))
     arrived, valid = np.zeros((len(starts), most), dtype=np.intp), np.zeros((len(starts), most), dtype=np.bool_)
     for w, (start, found) in enumerate(zip(starts, own, strict=True)):
         arrived[w, : len(found)], valid[w, : len(found)] = found - start, True
-    pressures = np.stack([trial.pressures[:, s : s + k].T for s in starts])
+    pressures = np.stack([trial.pressures[:, s : s + length].T for s in starts])
     positions = np.nan_to_num(trial.positions.T[starts[:, None] + arrived])
     known = np.isfinite(pressures)  # of a rail nothing in the first two chambers
     return Windows(
         trial,
-        k,
+        length,
         starts,
         arrived,
         valid,
         np.where(known, pressures, 0.0),
         positions,
-        _guess(trial, rig, starts, fresh),
+        state,
         known.astype(np.float64),
         valid.astype(np.float64),
-        budget or Budget.of(trial),
+        budget,
         free_rows(rig),
         rig.friction.bristle_stiffness,
     )

@@ -1,0 +1,58 @@
+"""birthsim compare: a log beside the models of one rig or several, where and when each leaves it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from baselines.identification.comparing.report import data_of, printed, report
+from birthsim.command_line.settings import MANY, TABLE, WORLD, Logged, number
+from birthsim.identification import compare_log, judging_of
+from birthsim_env.files import make_folder, whole_results, write_json, write_text
+
+ASKED = ("window", "multiple", "pressure_limit", "position_limit", "horizon")
+"""Options that say how a log is compared."""
+
+
+@dataclass(kw_only=True)
+class Settings(Logged):
+    r"""Play a log's openings and forces through the model of a rig: what it is off in each signal, where and when it leaves the
+    log. Several rigs are ranked.
+    """
+
+    log: Annotated[Path, TABLE] = field(kw_only=False)
+    """A table as birthsim identify reads it: time, openings, pressures, positions, forces."""
+    parameters: Annotated[list[str] | None, MANY, Parameter(group=WORLD, metavar="FILE...")] = None
+    """TOML files of the rigs, else the paper's rig."""
+    window: Annotated[float | None, number("S")] = None
+    """After how long the model is begun anew, else 0.25 s."""
+    multiple: Annotated[float | None, number("TIMES")] = None
+    """A free run has left the log where its error is so many times the noise, else 10."""
+    pressure_limit: Annotated[float | None, number("PA")] = None
+    """Pressures leave the log at this error instead."""
+    position_limit: Annotated[float | None, number("M")] = None
+    """Positions leave the log at this error instead."""
+    horizon: Annotated[float | None, number("S")] = None
+    """How long free runs are followed that begin all over the log, else 2 s."""
+    out: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
+    """Folder for report.md, compare.json and figures."""
+
+
+def main(settings: Settings) -> None:
+    """Compare, print, and write the report."""
+    asked = {name: value for name in ASKED if (value := getattr(settings, name)) is not None}
+    judging = judging_of(**asked)
+    folder = None if settings.out is None else make_folder(settings.out)
+    found = compare_log(settings.log, settings.parameters or [None], settings.options(), judging)
+    print(printed(found))
+    if folder is not None:
+        # pyplot takes half a second to load.
+        from baselines.figures.compared import free_run_figure, windows_figure
+
+        with whole_results(folder) as place:
+            drawn = [*windows_figure(found, place), *free_run_figure(found, place)]
+            pictures = [path.name for path in drawn if path.suffix == ".png"]
+            write_text(place / "report.md", report(found, settings.log.name, pictures))
+            write_json(place / "compare.json", data_of(found, settings.log.name))
+        print(f"written to {folder}/: report.md, compare.json, {', '.join(pictures)} (each picture as .svg too)")
