@@ -59,10 +59,10 @@ def verdicts(found: Comparison) -> list[str]:
 
 
 def _told(first: Place, other: Place) -> str:
-    interval = f"{other.more:.3g} (95 % interval {other.low:.3g} to {other.high:.3g})"
+    more = f"{other.more:.3g} times the noise (95 % interval {other.low:.3g} to {other.high:.3g})"
     if other.is_worse:
-        return f"{first.name} is nearer to the log than {other.name}: the error is less by {interval} times the noise"
-    return f"the log does not tell {first.name} and {other.name} apart: their errors differ by {interval} times the noise"
+        return f"{first.name} is nearer to the log than {other.name}, whose error is larger by {more}"
+    return f"the log does not tell {first.name} and {other.name} apart: their errors differ by {more}"
 
 
 def _reach(one: Compared) -> str:
