@@ -10,6 +10,11 @@ from baselines.identification.comparing.report import data_of, printed, report
 from birthsim.command_line.settings import MANY, TABLE, WORLD, Logged, number
 from birthsim.identification import compare_log, judging_of
 from birthsim_env.files import make_folder, whole_results, write_json, write_text
+from birthsim_live.logs.recording import SUFFIX
+from birthsim_live.logs.twin import write_twin
+
+TWIN = f"twin{SUFFIX}"
+"""The log beside the nearest rig, for the page."""
 
 ASKED = ("window", "multiple", "pressure_limit", "position_limit", "horizon")
 """Options that say how a log is compared."""
@@ -36,7 +41,7 @@ class Settings(Logged):
     horizon: Annotated[float | None, number("S")] = None
     """How long free runs are followed that begin all over the log, else 2 s."""
     out: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
-    """Folder for report.md, compare.json and figures."""
+    """Folder for report.md, compare.json, figures, and twin.rec, which birthsim live --replay plays."""
 
 
 def main(settings: Settings) -> None:
@@ -55,4 +60,6 @@ def main(settings: Settings) -> None:
             pictures = [path.name for path in drawn if path.suffix == ".png"]
             write_text(place / "report.md", report(found, settings.log.name, pictures))
             write_json(place / "compare.json", data_of(found, settings.log.name))
-        print(f"written to {folder}/: report.md, compare.json, {', '.join(pictures)} (each picture as .svg too)")
+            write_twin(found.nearest, found.trial, place / TWIN)
+        print(f"written to {folder}/: report.md, compare.json, {', '.join(pictures)} (each picture as .svg too), {TWIN}")
+        print(f"birthsim live --replay {folder / TWIN} plays the log beside {found.nearest.name}")

@@ -35,7 +35,7 @@ def test_several_rigs_are_ranked_and_reported(
     ranking = [line.split()[0] for line in printed.splitlines() if re.match(r"\S+\.toml +\d", line)]
     assert ranking == ["true.toml", "heavy.toml"]
     assert "true.toml is nearer to the log than heavy.toml" in printed
-    names = ["compare.json", "free_run.png", "free_run.svg", "report.md", "windows.png", "windows.svg"]
+    names = ["compare.json", "free_run.png", "free_run.svg", "report.md", "twin.rec", "windows.png", "windows.svg"]
     assert sorted(path.name for path in out.iterdir()) == names
     assert_picture(out, "free_run")
     assert_picture(out, "windows")

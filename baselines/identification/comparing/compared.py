@@ -175,6 +175,8 @@ class Comparison:
         The limit of each signal, beyond which a free run has left the log.
     notes : tuple of str
         What of the log was left out, a line each.
+    trial : Trial
+        The log, as it was read for the first rig.
 
     Examples
     --------
@@ -192,6 +194,12 @@ class Comparison:
     window: float
     limits: dict[str, float]
     notes: tuple[str, ...]
+    trial: Trial
+
+    @property
+    def nearest(self) -> Compared:
+        """The rig with the least error."""
+        return next(one for one in self.rigs if one.name == self.places[0].name)
 
 
 def compare(candidates: Sequence[Candidate], judging: Judging = Judging(), tick: Tick = lambda: None) -> Comparison:
@@ -215,7 +223,7 @@ def compare(candidates: Sequence[Candidate], judging: Judging = Judging(), tick:
     ]
     places = ranked({one.name: one.scores for one in found})
     notes = tuple(dict.fromkeys(note for one in candidates for note in one.trial.notes))
-    return Comparison(tuple(found), places, signals, every[0].length * first.trial.period, limits, notes)
+    return Comparison(tuple(found), places, signals, every[0].length * first.trial.period, limits, notes, first.trial)
 
 
 def _compared(
