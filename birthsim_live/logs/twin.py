@@ -26,8 +26,9 @@ MOST = 100_000
 def write_twin(one: Compared, trial: Trial, path: Path) -> None:
     """Write the free run of a rig beside the log that a ``trial`` holds."""
     run = one.free
-    interval = max(EVERY * trial.period, (run.end - run.start) / MOST)
-    times: Array = run.start + interval * np.arange(int((run.end - run.start) / interval + 1e-9) + 1, dtype=np.float64)
+    lasted = min(float(track.times[np.isfinite(track.measured)][-1]) for track in run.tracks) - run.start
+    interval = max(EVERY * trial.period, lasted / MOST)
+    times: Array = run.start + interval * np.arange(int(lasted / interval + 1e-9) + 1, dtype=np.float64)
     log, twin = ({track.signal.name: _at(track, times, part) for track in run.tracks} for part in (0.0, 1.0))
     rows = np.full((len(times), 2 * COLUMNS), np.nan)
     places = [_placed(values, one.rig) for values in (log, twin)]

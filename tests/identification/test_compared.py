@@ -218,15 +218,21 @@ def test_what_was_not_measured_is_left_out_and_a_gap_ends_a_free_run() -> None:
     log = part(trial(), 0, 3000)
     pressures, unknown = log.pressures.copy(), np.zeros(3000, dtype=np.bool_)
     pressures[1, 300:340] = np.nan
-    unknown[1500:1540] = True
+    unknown[1900:1940] = True
     log = dataclasses.replace(log, pressures=pressures, unknown=unknown)
     (found,) = beside(log, true=TRUE).rigs
     assert all(error.over_noise < 1.1 for error in found.errors)
     assert np.isnan(found.tracks[1].measured).sum() == 40
     assert found.free.at_gap
-    assert found.free.end == pytest.approx(log.times[1500])
-    assert not [start for start in found.starts if log.times[1500] - 0.25 < start < log.times[1540]]
-    np.testing.assert_array_equal(rows_ahead(log)[[0, 1499, 1500, 1540, 2999]], [1500, 1, 0, 1459, 0])
+    assert found.free.end == pytest.approx(log.times[1900])
+    assert not [start for start in found.starts if log.times[1900] - 0.25 < start < log.times[1940]]
+    np.testing.assert_array_equal(rows_ahead(log)[[0, 1899, 1900, 1940, 2999]], [1900, 1, 0, 1059, 0])
+    early = np.zeros(3000, dtype=np.bool_)
+    early[500:540] = True
+    (found,) = beside(dataclasses.replace(log, unknown=early), true=TRUE).rigs
+    assert found.free.start > log.times[540]  # the longer stretch
+    assert found.free.end == log.times[2999]
+    assert not found.free.at_gap
 
 
 def test_limits_are_multiples_of_the_noise_or_what_is_asked() -> None:

@@ -93,7 +93,7 @@ class Taken:
             ],
         }
         return [
-            f"taken off as errors of the sensors, as much as {known} lets them be: {', '.join(found)}; what is more stays"
+            f"taken off as errors of the sensors, as much as {known} lets them be: {', '.join(found)}; the rest is error"
             for known, found in kinds.items()
             if found
         ]

@@ -111,10 +111,11 @@ def first_beyond(track: Track, limit: float, starts: Array) -> tuple[Array, Arra
 
 
 def free_run(windows: Windows, rig: Parameters, signals: tuple[Signal, ...], limits: Mapping[str, float]) -> FreeRun:
-    """The free run from the first window to the end of the log, or to its first gap."""
-    trial, first = windows.trial, int(windows.starts[0])
-    length = int(rows_ahead(trial)[first])
-    long = runs_on(windows, rig, np.zeros(1, dtype=np.intp), length)
+    """The free run through the whole log, or through its longest stretch without a gap in openings or forces."""
+    trial, lengths = windows.trial, rows_ahead(windows.trial)[windows.starts]
+    chosen = np.array([np.argmax(lengths)])
+    first, length = int(windows.starts[chosen[0]]), int(lengths[chosen[0]])
+    long = runs_on(windows, rig, chosen, length)
     tracks, start = followed(long, rig, signals), trial.times[[first]]
     leaves = []
     for track in tracks:
