@@ -259,3 +259,15 @@ def test_every_figure_of_the_tables_is_in_the_data(ranked_rigs: Comparison) -> N
 def test_rigs_that_cannot_be_beside_the_log_are_refused(rig: Parameters, named: str) -> None:
     with pytest.raises(ValueError, match=f"{named} = .*; allowed"):
         beside(part(trial(), 0, 2100), true=TRUE, other=rig)
+
+
+@pytest.mark.parametrize("more", [{"chambers.tube_length": 1.0}, {"valves.hysteresis": 0.03}])
+def test_what_a_rig_has_besides_is_played_too(more: dict[str, float]) -> None:
+    rig = OWNER.replace(more)
+    log = part(run_plan(propose(OWNER, 4.0, 3), [rig], make_controller("backstepping", OWNER), "lab", 11)[0], 0, 2500)
+    found = beside(log, without=OWNER, true=rig)
+    assert [place.name for place in found.places] == ["true", "without"]
+    assert found.places[1].is_worse
+    assert found.places[0].error < 1.0
+    without, true = (min(leaving.after for leaving in one.free.leaves) for one in found.rigs)
+    assert without < 0.5 < true
