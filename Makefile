@@ -153,8 +153,8 @@ kills: $(READY)
 	KILLS=$${KILLS:-12} nice $(PYTEST) tests/kills
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live lab tests .ci
-	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_live lab tests .ci
+	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_drive birthsim_live lab tests .ci
+	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_drive birthsim_live lab tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/ruff check docs/conf.py docs/_generate

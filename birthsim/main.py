@@ -42,6 +42,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "explain": Command("what a trained residual has learned", "--policy circle --no-pushes --out out/explain"),
     },
     "use elsewhere": {
+        "drive": Command("a controller on a real rig, within limits", "--driver simulated --duration 3 --out out/drive"),
         "export": Command("policies, loops and logs in other forms", "--to wasm --out out/wasm"),
     },
     "this machine": {

@@ -40,6 +40,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "reader": ("birthsim_env.tables.readers",),
     "export": ("birthsim.exports",),
     "device": ("birthsim_env.episodes", "birthsim_build.device.episodes"),
+    "driver": ("birthsim_drive.drivers",),
     "study": ("lab.studies",),
 }  # fmt: skip
 """Kind -> packages, or modules, in which entries of that kind stand. A room that is not installed is empty."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.physics.rig.values import shown
 
-PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live")
+PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_drive", "birthsim_live")
 
 POSITIONS = {"pos": 624, "buffer_pos": 4}
 """Where generators of NumPy stand in their own tables, and the lengths of these: NumPy itself checks neither."""

@@ -42,9 +42,10 @@ def whole(least: int = 1, most: int = MOST) -> Parameter:
     return Parameter(converter=read, metavar=f"{least}..{most}")
 
 
-def number(unit: str, above: float = -math.inf, most: float = math.inf) -> Parameter:
-    """An option's finite number in ``unit``, more than ``above`` and at most ``most``."""
-    limits = [f"> {above:g}"] * math.isfinite(above) + [f"<= {most:g}"] * math.isfinite(most)
+def number(unit: str, above: float = -math.inf, most: float = math.inf, least: float = -math.inf) -> Parameter:
+    """An option's finite number in ``unit``, more than ``above``, at least ``least`` and at most ``most``."""
+    bounds = {"> ": above, ">= ": least, "<= ": most}
+    limits = [f"{sign}{bound:g}" for sign, bound in bounds.items() if math.isfinite(bound)]
 
     def read(_: type, tokens: Sequence[Token]) -> float:
         text = tokens[0].value
@@ -52,7 +53,7 @@ def number(unit: str, above: float = -math.inf, most: float = math.inf) -> Param
             value = float(text)
         except ValueError:
             value = math.nan
-        if not (math.isfinite(value) and above < value <= most):
+        if not (math.isfinite(value) and above < value and least <= value <= most):
             raise ValueError(f"{text[:40]!r}; allowed: {' '.join(['a finite number', ' and '.join(limits)]).rstrip()}")
         return value
 

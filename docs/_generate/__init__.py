@@ -9,6 +9,7 @@ from pathlib import Path
 from _generate.api import api
 from _generate.commands import commands
 from _generate.controllers import controllers
+from _generate.drives import faults, provoked
 from _generate.environments import environments
 from _generate.metrics import metrics
 from _generate.page import page
@@ -27,10 +28,12 @@ PARTS = {
     "commands.md": commands,
     "controllers.md": controllers,
     "environments.md": environments,
+    "faults.md": faults,
     "metrics.md": metrics,
     "options.md": options,
     "page.md": page,
     "pipeline.md": pipeline,
+    "provoked.md": provoked,
     "readers.md": readers,
     "rig.md": rig,
     **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},

@@ -58,7 +58,7 @@ def test_zig_compiles_without_a_home(homeless, tmp_path):
 
 def test_only_this_place_runs_programs_of_others():
     """Of the packages: what else runs is Python itself, which compiles."""
-    packages = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents")
+    packages = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_drive", "birthsim_live", "baselines", "agents")
     files = files_of(*packages)
     runs = {f"{path.parent.name}/{path.name}" for path in files if "import subprocess" in path.read_text(encoding="utf-8")}
     assert runs == {"code/tools.py", "code/compiler.py", "kernels/__main__.py", "kernels/recording.py"}

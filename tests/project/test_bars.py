@@ -4,7 +4,17 @@ import ast
 
 from birthsim_env.physics.compiled.sources import files_of
 
-PACKAGES = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents", "lab", "examples")
+PACKAGES = (
+    "birthsim",
+    "birthsim_env",
+    "birthsim_build",
+    "birthsim_drive",
+    "birthsim_live",
+    "baselines",
+    "agents",
+    "lab",
+    "examples",
+)
 
 
 def bars():

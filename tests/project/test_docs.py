@@ -26,7 +26,7 @@ TABLES = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data"
 
 def with_tables(page):
     text = page.read_text(encoding="utf-8")
-    return re.sub(r"^```\{include\} data/(.*)\n```$", lambda block: TABLES[block[1]], text, flags=re.MULTILINE)
+    return re.sub(r"^```\{include\} (?:\.\./)?data/(.*)\n```$", lambda block: TABLES[block[1]], text, flags=re.MULTILINE)
 
 
 PAGES = {

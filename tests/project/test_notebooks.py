@@ -31,7 +31,7 @@ def read(notebooks, name):
 
 def test_without_an_address_a_tutorial_is_a_file_that_installs_from_its_clone(notebooks, monkeypatch):
     monkeypatch.delenv("BIRTHSIM_REPOSITORY", raising=False)
-    assert len(notebooks.NAMES) == 6
+    assert len(notebooks.NAMES) == 7
     for name in notebooks.NAMES:
         (first, *others), _ = read(notebooks, name)
         assert re.search(r'"install", "--quiet", "\.\./\.\.(\[agents\])?"\]', first)

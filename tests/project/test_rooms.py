@@ -42,7 +42,7 @@ def test_no_folder_of_tests_is_left_out(pytestconfig):
 def test_no_module_gives_a_name_twice():
     """A later constant or function of the same name would take the place of the first without a word."""
     twice = []
-    for path in files_of("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live"):
+    for path in files_of("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_drive", "birthsim_live"):
         named = set()
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             targets = [] if isinstance(node, ast.For) else getattr(node, "targets", [getattr(node, "target", node)])
@@ -116,5 +116,16 @@ def test_kernels_name_their_rows():
 def test_packages_are_walked_by_what_leaves_kept_code_alone():
     """Below ``__pycache__`` files come and go: a plain walk fails at a bad moment, so that ``files_of`` is the only one."""
     walking = re.compile(r"rglob\([\"']\*\.py[\"']\)")
-    packages = ("birthsim", "birthsim_env", "birthsim_build", "birthsim_live", "baselines", "agents", "lab", "docs", "tests")
+    packages = (
+        "birthsim",
+        "birthsim_env",
+        "birthsim_build",
+        "birthsim_drive",
+        "birthsim_live",
+        "baselines",
+        "agents",
+        "lab",
+        "docs",
+        "tests",
+    )
     assert [path for path in files_of(*packages) if walking.search(path.read_text(encoding="utf-8"))] == []

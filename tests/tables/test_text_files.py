@@ -17,7 +17,7 @@ from birthsim_env.tables.table import Reading
 from tests.console import ROOT
 
 NUMBERS = np.array([[0.0, 0.5, -0.25], [1.0, 0.51, 0.125], [2.0, 0.5, 0.0], [3.5, 1e-3, 7.0]])
-PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live")
+PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_drive", "birthsim_live")
 
 
 def written(heading: str = "time,x,y", separator: str = ",", after: str = "", numbers: np.ndarray = NUMBERS) -> str:

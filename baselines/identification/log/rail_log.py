@@ -59,7 +59,7 @@ def read_rail(path: Path, options: LogOptions, rig: Parameters) -> tuple[str, Tr
     for words in (*table.notes, chosen.note(), clock_note(chosen), note):
         if words:
             warnings.warn(words, stacklevel=3)
-    direction = _direction(rig)
+    direction = rail_direction(rig)
     places, forces = (direction[:, None] * one for one in (rig.geometry.k2 + position, force))
     return table.source, on_rail(Trial(times, openings, pressures, places, forces), rig)
 
@@ -68,7 +68,7 @@ def on_rail(trial: Trial, rig: Parameters) -> Trial:
     """A trial as the sensors of a rail have it: the encoder of the rod, and nothing of cylinder 1."""
     openings, pressures = trial.openings.copy(), trial.pressures.copy()
     openings[:2], pressures[:2] = 0.0, np.nan
-    direction, counted = _direction(rig), np.array([0.0, rig.electronics.encoder_offset])
+    direction, counted = rail_direction(rig), np.array([0.0, rig.electronics.encoder_offset])
     along = direction[:, None] * (direction @ trial.positions)
     topology = rig.linkage.topology
     return replace(trial, openings=openings, pressures=pressures, positions=along, counted=counted, topology=topology)
@@ -76,11 +76,12 @@ def on_rail(trial: Trial, rig: Parameters) -> Trial:
 
 def rail_rows(trial: Trial, rig: Parameters) -> Array:
     """The rows of ``RAIL_COLUMNS``, (7, T)."""
-    along, push = (_direction(rig) @ one for one in (trial.positions, trial.forces))
+    along, push = (rail_direction(rig) @ one for one in (trial.positions, trial.forces))
     return np.vstack([trial.times, trial.openings[2:], trial.pressures[2:], along - rig.geometry.k2, push])
 
 
-def _direction(rig: Parameters) -> Array:
+def rail_direction(rig: Parameters) -> Array:
+    """Unit vector (2,) along which the rod of a rail extends."""
     angle = rig.linkage.inclination
     return np.array([np.cos(angle), np.sin(angle)])
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from birthsim_env.physics.compiled.kept import PACKAGE, cache_folder, keep, kept
 
 ROOT = Path(__file__).resolve().parents[3]
-PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "lab")
+PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_drive", "birthsim_live", "lab")
 
 
 ASIDE = frozenset(Path(__file__).resolve().with_name(f"{name}.py") for name in ("kept", "prebuilt", "sources"))

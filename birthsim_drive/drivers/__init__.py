@@ -1,0 +1,1 @@
+"""Drivers: each file registers one by its name."""

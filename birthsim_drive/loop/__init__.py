@@ -1,0 +1,1 @@
+"""The control loop: its process, what it keeps, and its timing."""
