@@ -1,0 +1,118 @@
+"""How punctual ``birthsim drive`` is against a simulated rig in another process: quiet, beside busy processes, with and
+without a priority."""
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from baselines.work.tasks import Result, Task
+from birthsim_drive.safety.limits import Limits
+from birthsim_drive.session import Drive, perform
+from birthsim_drive.simulated import Simulated
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.registry import register
+from lab.engine.results import Content
+from lab.engine.study import Found, Options, Study
+from lab.engine.tables import markdown
+
+ENVIRONMENT, CONTROLLER, SENSORS = "BirthSIM/Probe-v3", "admittance-adaptive", "lab"
+
+CONDITIONS = {
+    "quiet, no priority": (0, 0),
+    "quiet, SCHED_FIFO": (0, 50),
+    "beside busy processes, no priority": (1, 0),
+    "beside busy processes, SCHED_FIFO": (1, 50),
+}
+"""Name -> whether others are busy, and the priority of the loop and of the simulated rig."""
+
+UNENDING = Limits(late_periods=1e9, fault_time=10.0, leap=10.0, position_age=10.0)
+"""So that a late period is counted and ends nothing."""
+
+BUSY = "while True: sum(k * k for k in range(10_000))"
+
+
+@contextmanager
+def busy(processes: int) -> Iterator[None]:
+    """Other processes that compute all the time."""
+    running = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(processes)]
+    try:
+        time.sleep(1.0)
+        yield
+    finally:
+        for one in running:
+            one.kill()
+            one.wait()
+
+
+def measure(others: int, priority: int, seconds: float) -> Result:
+    """One drive's timing."""
+    rig = Parameters()
+    simulated = Simulated(ENVIRONMENT, rig, SENSORS)
+    limits = UNENDING.for_rig(rig)
+    told = Drive("simulated", CONTROLLER, rig, limits, duration=seconds, priority=priority, simulated=simulated)
+    with tempfile.TemporaryDirectory() as folder, busy(others):
+        outcome = perform(told, Path(folder))
+    found = outcome.timing.summary()
+    kept = {name: found[name] for name in ("samples", "late", "missed_by_the_rig")}
+    shares = {name: {part: found[name][part] for part in ("median", "99.9 %", "largest")} for name in PARTS}
+    stalls = 0 if outcome.fate is None else outcome.fate.stalls
+    return {**kept, **shares, "stalls": stalls, "granted": outcome.granted, "faults": [one.kind for one in outcome.faults]}
+
+
+PARTS = ("periods", "jitter", "computing")
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    return {
+        name: Task(
+            f"drive-{k}", measure, {"others": options.others * is_busy, "priority": priority, "seconds": options.seconds}
+        )
+        for k, (name, (is_busy, priority)) in enumerate(CONDITIONS.items())
+    }
+
+
+def _kept(options: Options, found: Found) -> Any:
+    return [{"condition": name, **result} for name, result in found.items()]
+
+
+def _shown(content: Content) -> dict[str, str]:
+    settings, figures = content["settings"], content["figures"]
+    head = ["condition", "samples", "late", "missed by the rig", "stalls of the rig"]
+    lines = [[*head, *(f"{name}, us: median, 99.9 %, largest" for name in PARTS)]]
+    for one in figures:
+        cells = [", ".join(f"{1e6 * one[name][part]:.0f}" for part in ("median", "99.9 %", "largest")) for name in PARTS]
+        share = 100.0 * one["late"] / one["samples"]
+        lines.append(
+            [
+                one["condition"],
+                str(one["samples"]),
+                f"{one['late']} ({share:.2g} %)",
+                str(one["missed_by_the_rig"]),
+                str(one["stalls"]),
+                *cells,
+            ]
+        )
+    said = (
+        f"`{CONTROLLER}` behind the port limiter, `{SENSORS}` sensors, {settings['seconds']:g} s at 1 kHz, loop and simulated "
+        f"rig in two processes on one machine; busy: {settings['others']} others. *Late*: openings that took longer than a "
+        "control period, or samples that were skipped for newer ones. *Jitter*: by how much the time between two samples' "
+        "arrivals differs from that of the rig's clock. A simulated rig that is late itself by 5 periods *stalls*. "
+        f"Loop: {figures[-1]['granted']}."
+    )
+    return {"drive-timing.md": f"{said}\n\n{markdown(lines)}\n"}
+
+
+STUDY = Study(
+    {"seconds": 20.0, "others": 4},
+    _tasks,
+    _kept,
+    {"periods": "s", "jitter": "s", "computing": "s"},
+    _shown,
+    words={"seconds": "of each drive", "others": "processes that are busy"},
+)
+register(study="drive-timing", about="how punctual birthsim drive is, quiet and beside busy processes")(STUDY)
