@@ -115,4 +115,4 @@ STUDY = Study(
     _shown,
     words={"seconds": "of each drive", "others": "processes that are busy"},
 )
-register(study="drive-timing", about="how punctual birthsim drive is, quiet and beside busy processes")(STUDY)
+register(study="drive-timing", about="how punctual drive is, quiet and beside busy processes")(STUDY)

@@ -204,6 +204,7 @@ def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_fusing_is_given_no_chance(tmp_path):
     loop = pieces_of(begun(2, sensors="lab", controller="admittance-backstepping").simulation)
     compile_object(loop.functions, "ptx", tmp_path / "code.o", threads=threads.Threads(448))
