@@ -1,6 +1,7 @@
 """birthsim live: the rig in the browser, in real time, to see and to push."""
 
 import socket
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +13,8 @@ from birthsim.command_line.settings import CONTROL, MANY, Configured, RigFile, n
 from birthsim.serving import need_server, serve
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
-from birthsim_live.logs.recording import load_recording
+from birthsim_env.registry import names
+from birthsim_live.logs.recording import SUFFIX, load_recording
 from birthsim_live.rig.folder import Packed, offer, packed_page, write_page
 from birthsim_live.server.addresses import host_name, listen
 
@@ -24,7 +26,8 @@ class Settings(Configured):
     """
 
     replay: Annotated[Path | None, Parameter(metavar="FILE")] = None
-    """Play what the page recorded, .rec: pause, seek, slow motion."""
+    """Play what the page recorded, .rec: pause, seek, slow motion. Or a log, as identify reads it, beside its twin: the rig of
+    --parameters in free run under the log's openings and forces."""
     port: Annotated[int | None, whole(0, 65535)] = None
     """0 takes any that is free; else 8000, with --replay 8001."""
     host: str = "127.0.0.1"
@@ -81,10 +84,30 @@ def _packed(settings: Settings, rig: Parameters) -> Packed:
 
 
 def _replay(settings: Settings, file: Path) -> None:
-    for name in ("parameters", "controller", "compare", "static", "policy"):
+    is_log = file.suffix.lower() in names("reader")
+    for name in ("controller", "compare", "static", "policy", *(() if is_log else ("parameters",))):
         if getattr(settings, name):
             raise ValueError(f"--{name} with --replay; allowed: without it, a recording has its own rig")
     need_server()
+    with tempfile.TemporaryDirectory() as folder:
+        if is_log:
+            settings.replay = _twin(file, settings.parameters, Path(folder))
+        _play(settings, settings.replay or file, file.name)
+
+
+def _twin(log: Path, parameters: str | None, folder: Path) -> Path:
+    """A recording of a log beside the free run of a rig."""
+    from baselines.identification.log.log_columns import LogOptions  # these load what identifies
+    from birthsim.identification import compare_log, judging_of
+    from birthsim_live.logs.twin import write_twin
+
+    found, path = compare_log(log, [parameters], LogOptions(), judging_of()), folder / f"{log.stem}{SUFFIX}"
+    write_twin(found.nearest, found.trial, path)
+    return path
+
+
+def _play(settings: Settings, file: Path, name: str) -> None:
+    """Serve the page of a recording, which is called ``name``."""
     from birthsim_live.rig.greeting import greeting  # which draws
 
     with _listening(settings, 8001) as listening:
@@ -93,5 +116,5 @@ def _replay(settings: Settings, file: Path) -> None:
         # It draws the recording's rig; the one that it could run stands still and is not seen.
         hello = packed.content["hello"]
         drawn = greeting(recording.rig, hello["choices"]["controller"])
-        hello |= {**drawn, "defaults": hello["defaults"], "replay": file.name}
-        serve(packed, recording.rig, listening, settings, f"birthsim live --replay {file.name}, {recording.duration:.1f} s")
+        hello |= {**drawn, "defaults": hello["defaults"], "replay": name}
+        serve(packed, recording.rig, listening, settings, f"birthsim live --replay {name}, {recording.duration:.1f} s")

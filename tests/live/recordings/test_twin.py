@@ -8,13 +8,17 @@ import pytest
 from baselines.identification.comparing.compared import Candidate, compare
 from baselines.identification.experiment import propose
 from baselines.identification.laboratory import run_plan
+from baselines.identification.log.log_columns import LogOptions
+from baselines.identification.log.log_file import write_trial
 from baselines.named import make_controller
+from birthsim.identification import compare_log, judging_of
 from birthsim_env.physics.linkage.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import SLICES, load_recording
 from birthsim_live.logs.twin import write_twin
+from tests.console import call
 from tests.identification.test_compared import HEAVY
-from tests.identification.trials import part, trial
+from tests.identification.trials import OWNER, part, trial
 from tests.live.browser import Server, Window
 
 NAMES = "[...document.querySelectorAll('.rigs b')].map((one) => one.textContent)"
@@ -81,3 +85,30 @@ def test_the_page_plays_both(chromium, file):
         off = (read.rows - read.second)[row, SLICES["position"]]
         assert frame["error_mm"] == pytest.approx(0.0)
         assert frame["second"]["error_mm"] == pytest.approx(1e3 * np.hypot(*off), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_page_plays_a_log_beside_the_rig_that_is_named(chromium, tmp_path):
+    log, rig, path = tmp_path / "log.csv", tmp_path / "heavy.toml", tmp_path / "expected.rec"
+    write_trial(part(trial(), 0, 2100), log, OWNER)
+    HEAVY.to_toml(rig)
+    found = compare_log(log, [str(rig)], LogOptions(), judging_of())
+    write_twin(found.nearest, found.trial, path)
+    with Server("live", "--replay", log, "--parameters", rig) as server, Window(chromium, server.url) as window:
+        window.wait("birthsim.hello !== null && birthsim.hello.mode === 'replay' && document.body.dataset.rigs === '2'")
+        assert window.value(NAMES) == ["the log", "heavy.toml in free run"]
+        assert window.value("birthsim.hello.replay") == "log.csv"
+        window.pause()
+        window.page.locator("#scrub").fill("1.5")
+        window.wait("Math.abs(birthsim.frame.time - 1.5) < 1e-4")
+        read = load_recording(path)
+        off = (read.rows - read.second)[round(1.5 / read.interval), SLICES["position"]]
+        assert window.frame()["second"]["error_mm"] == pytest.approx(1e3 * np.hypot(*off), rel=1e-6)
+
+
+def test_a_recording_has_its_own_rig(monkeypatch, capsys, file, tmp_path):
+    path, _ = file
+    HEAVY.to_toml(tmp_path / "heavy.toml")
+    status, _, error = call("live", monkeypatch, capsys, "--replay", path, "--parameters", tmp_path / "heavy.toml")
+    assert status == 2
+    assert "--parameters with --replay; allowed: without it" in error
