@@ -80,7 +80,12 @@ class Limits:
     def words(self) -> list[str]:
         """What is guarded and what happens: a line a limit, and a line an action."""
         numbers = [one for one in fields(self) if one.metadata]
-        lines = [f"{one.name} {getattr(self, one.name):g} {one.metadata['unit']}: {one.metadata['about']}" for one in numbers]
+        units = {"1": ""}
+        lines = [
+            f"{one.name} {getattr(self, one.name):g} {units.get(one.metadata['unit'], one.metadata['unit'])}".rstrip()
+            + f": {one.metadata['about']}"
+            for one in numbers
+        ]
         by_action: dict[str, list[str]] = {}
         for kind in KINDS:
             if kind not in WATCHED:
