@@ -99,6 +99,7 @@ def test_what_lacks_a_part_and_what_is_no_object_is_named():
 
 OWN = {
     "birthsim_build/code/emit.py": "its parent's words", "agents/training/checkpoint.py": "what it has just written",
+    "birthsim_drive/session.py": "what its processes wrote in this drive: what was left before is removed",
     "birthsim_env/physics/compiled/sources.py": "under a SHA-256",
     "birthsim_env/physics/compiled/prebuilt.py": "what make kernels wrote, and what is damaged counts as missing",
     **{f"birthsim_build/kernels/{name}.py": "what make kernels wrote" for name in ("__main__", "freshness", "recording")},
