@@ -17,9 +17,9 @@ class Driver(Protocol):
     Notes
     -----
     ``read()`` waits for the rig's next sample and returns it as a ``Measurement`` of one rig, without lanes: ``position`` (2,),
-    m, ``pressures`` (4,), Pa, absolute, and so on, each float64; a signal that no sensor measures is 0, and one whose sensor
-    fails is NaN. It raises ``TimeoutError`` where no sample comes within a few control periods. The rig's clock paces the loop.
-    A driver whose hardware is polled calls ``Pace.wait`` first, which waits for the computer's clock instead.
+    m, ``pressures`` (4,), Pa, absolute, and so on, each float64; a signal that no sensor measures, or whose sensor fails, is
+    NaN. It raises ``TimeoutError`` where no sample comes within a few control periods. The rig's clock paces the loop. A driver
+    whose hardware is polled calls ``Pace.wait`` first, which waits for the computer's clock instead.
 
     ``write(openings)`` sets the valves of chambers P1, N1, P2, N2, (4,), from -1, to the exhaust, to 1, to the supply, and
     returns at once. ``stop()`` makes the rig safe and lets go of it: it closes the valves, or does what the wiring offers, such
@@ -68,7 +68,10 @@ def make_driver(name: str, rig: Parameters) -> Driver:
         return _own_driver(name, rig)
     kind, _, place = name.partition(":")
     made: Maker = entry("driver", kind, ", or path/to/file.py:Class").made
-    return made(rig, place)
+    try:
+        return made(rig, place)
+    except OSError as error:
+        raise ValueError(f"driver = {shown(name)}: {error.strerror or error}; allowed: a rig that can be reached") from error
 
 
 def _own_driver(name: str, rig: Parameters) -> Driver:

@@ -24,9 +24,9 @@ A *command* goes to the rig, 60 bytes:
     52         uint32         0
     56         uint32         CRC-32 of all before
 
-A signal that no sensor measures is 0, and one whose sensor fails NaN. The rig sends samples to where commands come from. It
-closes its valves by itself where no command comes for some 20 ms: no program on a computer can do that for it. c/birthsim_udp.h
-has the same in C.
+A signal that no sensor measures is 0, where its flag says so, and one whose sensor fails NaN.
+The rig sends samples to where commands come from. It closes its valves by itself where no command comes for some 20 ms: no
+program on a computer can do that for it. c/birthsim_udp.h has the same in C.
 """
 
 import struct

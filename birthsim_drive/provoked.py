@@ -71,6 +71,7 @@ SIGNALS: dict[str, tuple[str, Callable[[Signals, Signals], None]]] = {
     "moved": ("the position reads 0.3 m too far out", _add(X, 0.3)),
     "blind": ("the tracker shows the same old position", _keep(X, X + 1, STAMP)),
     "frozen": ("all signals stand still, the clock too", _keep(*range(14))),
+    "nan-clock": ("the rig's clock reads NaN", _put(TIME, math.nan)),
     "clock-back": ("the rig's clock goes back by 1 s", _add(TIME, -1.0)),
 }
 """Kind -> what happens to a sensor, and what that does to the signals now and when it began."""

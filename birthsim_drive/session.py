@@ -121,9 +121,8 @@ class Outcome:
         """What ``birthsim identify`` reads: a row a sample."""
         rows, signals = self.sampled, Signals(self.sampled[Period.signals.place])
         counted = np.full(2, rig.electronics.encoder_offset) if self.has_encoders else None
-        trial = Trial(
-            signals.time, rows[Period.opening.place], signals.pressure, signals.position, signals.user_force, counted=counted
-        )
+        force = signals.user_force if np.isfinite(signals.user_force).any() else np.zeros_like(signals.user_force)
+        trial = Trial(signals.time, rows[Period.opening.place], signals.pressure, signals.position, force, counted=counted)
         return on_rail(trial, rig) if rig.linkage.is_rail else trial
 
 

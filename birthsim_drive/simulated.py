@@ -69,7 +69,6 @@ class Simulated:
     seed: int = 0
     lockstep: bool = False
     provoked: tuple[str, ...] = ()
-    randomize: bool | str = False
 
 
 @dataclass
@@ -205,7 +204,6 @@ def serve(told: Simulated, link: socket.socket, begins: Callable[[], object] = l
         policy_period=rig.electronics.control_period,
         actuation=driving(remote, None),
         sensors=told.sensors,
-        randomize=told.randomize,
     )
     env.reset(seed=told.seed)
     simulation, plant = env.unwrapped.simulation, env.unwrapped.simulation.plant

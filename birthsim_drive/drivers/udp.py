@@ -59,11 +59,6 @@ class UdpDriver:
         self._ask()
 
     @property
-    def has_force(self) -> bool:
-        """Whether the hand's force is measured."""
-        return bool(self.sample.flags & FORCE)
-
-    @property
     def has_encoders(self) -> bool:
         """Whether positions are of encoders."""
         return bool(self.sample.flags & ENCODERS)
@@ -85,6 +80,8 @@ class UdpDriver:
         numbers = np.array(self.sample.signals)
         acceleration = numbers[6:8] if self.sample.flags & ACCELERATION else None
         sampled = bool(self.sample.flags & SAMPLED)
+        if not self.sample.flags & FORCE:  # a controller that needs it must not take it for 0 N
+            numbers[12:14] = np.nan
         return Measurement(
             numbers[0], numbers[1:3], numbers[3], numbers[4:6], numbers[8:12], numbers[12:14], sampled, acceleration
         )

@@ -93,7 +93,9 @@ class Supervisor:
         return None
 
     def _not_finite(self, seen: Measurement) -> Found:
-        if math.isfinite(sum(seen.pressures.tolist()) + sum(sum(getattr(seen, name).tolist()) for name in self._pairs)):
+        times = float(seen.time) + float(seen.position_time)
+        pairs = sum(sum(getattr(seen, name).tolist()) for name in self._pairs)
+        if math.isfinite(times + sum(seen.pressures.tolist()) + pairs):
             self._bad = 0
             return None
         bad = [name for name in self._needs if not np.isfinite(self._own(name, getattr(seen, name))).all()]

@@ -36,6 +36,7 @@ SEEN = {
     "moved": ("workspace", 0.0),
     "blind": ("blind", Limits().position_age),
     "frozen": ("frozen", FAULT_TIME),
+    "nan-clock": ("not finite", FAULT_TIME),
     "clock-back": ("clock", 0.0),
     "silence": ("missing", FAULT_TIME),
     "damaged": ("missing", FAULT_TIME),
@@ -337,3 +338,11 @@ def test_a_controller_remembers_across_a_missing_sample(tmp_path, sensors):
     assert loop.faults == []
     assert made == [True] if sensors == "lab" else made == [True, False]
     assert unharmed(fate)
+
+
+@pytest.mark.parametrize(("controller", "kinds"), [("admittance-adaptive", ["not finite"]), ("backstepping", [])])
+def test_a_controller_that_needs_a_force_is_not_told_0_where_nobody_measures_it(tmp_path, monkeypatch, controller, kinds):
+    monkeypatch.setattr("birthsim_drive.simulated.FORCE", 0)
+    loop, record, _ = drive(tmp_path, controller=controller, limiter=False)
+    assert [one.kind for one in loop.faults] == kinds
+    assert "user_force" in loop.faults[0].said if kinds else record.count > 500

@@ -259,3 +259,11 @@ def test_a_fault_is_seen_in_the_exit_status(tmp_path):
     dry = run("drive", *options[:-1], str(tmp_path / "dry"), "--dry-run")
     assert dry.returncode == 0, dry.stderr
     assert "dry run, nothing happens; else: close" in dry.stdout
+
+
+@pytest.mark.parametrize("place", ["127.0.0.1:9", "255.255.255.255:9"])
+def test_a_rig_that_nobody_reaches_is_said_in_a_line(tmp_path, place):
+    done = run("drive", "--driver", f"udp:{place}", "--duration", "0.2", "--out", str(tmp_path / "out"))
+    assert done.returncode in (1, 2)
+    assert "Traceback" not in done.stderr
+    assert "start: no good sample has come at all" in done.stdout or "allowed: a rig that can be reached" in done.stderr
