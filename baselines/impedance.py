@@ -62,8 +62,9 @@ def matrix_root(matrix: Array) -> Array:
     return np.asarray((matrix + root * np.eye(2)[:, :, None]) / trace)
 
 
-def mass_spring_damper(reference: Reference, mass: float, damping_ratio: float) -> Impedance:
-    """The impedance of ``baselines.estimation.admittance``: mass m (kg), the stiffness asked for, B = 2 zeta (m K)^(1/2)."""
+def mass_spring_damper(reference: Reference, mass: float | Array, damping_ratio: float) -> Impedance:
+    """The impedance of ``baselines.estimation.admittance``: mass m (kg), one or (N,), the stiffness asked for, and the damping
+    B = 2 zeta (m K)^(1/2)."""
     require_good(reference)
     stiffness = stiffness_matrix(reference)
     damping = 2.0 * damping_ratio * mass * matrix_root(stiffness / mass)

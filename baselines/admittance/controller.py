@@ -7,26 +7,31 @@ With lab ones it halves what the worst rigs lose, but those in the middle hunt f
     birthsim tune --controller admittance-backstepping --trials 45 --seed 1 --sensors lab --start gains.json --out out/tune/lab
 """
 
-import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import estimator, law
+from baselines.admittance import belief, estimator, law
+from baselines.admittance.belief import Belief
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, checked_gains, require_stiffness
-from baselines.estimation import friction_observer, inertial
+from baselines.estimation import friction_observer, inertial, rig_filter
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.hand import friction_candidates
+from baselines.estimation.rig_filter import RigFilter
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import INTERMEDIATE, POSITION
-from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETERS, Array, parameter_array
+from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
+from birthsim_env.physics.rig.rows import plant_parameters
+from birthsim_env.physics.rig.values import near, shown
 from birthsim_env.registry import register
 
 LEAST_FRACTION = 0.35
@@ -38,10 +43,11 @@ wave lowers it at once. A late tracker makes light rigs swing at 10 Hz until the
 noisy one makes them swing at 1 Hz. Found by trial, in randomised worlds with data-sheet sensors; without a force sensor
 friction then hunts more."""
 
-HEAVY = 5.0
-"""kg; assumed: the gains were found on rigs up to this mass. The noise of samples moves a head by the more, the more mass times
-gain answers it. With sampled positions and a force sensor, where it learns, a heavier head therefore rests with a gain lower
-by sqrt(HEAVY/mass). At 9 kg it then hunts by 0.6 instead of 1.7 mm. The root was found by trial."""
+HEAVY, ANY_MASS = 5.0, 1e9
+"""kg. The second stands for none. The first is assumed: the gains were found on rigs up to this mass. The noise of samples
+moves a head by the more, the more mass times gain answers it. With sampled positions and a force sensor, where it learns, a
+heavier head therefore rests with a gain lower by sqrt(HEAVY/mass). At 9 kg it then hunts by 0.6 instead of 1.7 mm. The root
+was found by trial."""
 
 SWING = 0.015
 """m/s of the speed error, beyond which a loop that knows the hand by friction alone is calmed at rest; found by trial."""
@@ -106,6 +112,9 @@ class AdmittanceController(StagedController):
             Then a resting hand is found by the bristles and the head rests quietly; with half that friction it wanders by
             10 mm. With an acceleration sensor LuGre alone is then believed, so that small slow pushes are found sooner;
             without this option other laws of friction are weighed too, and one that explains more takes its place.
+        own_beliefs: whether lanes may believe in different rigs, which ``believe`` tells them.
+        finds_rig: with a force sensor: whether each lane finds ten parameters of its rig while it runs, ``found_rig``, and
+            believes in them: mass, supply, bores, friction, lag of the valves and dead volume (``rig_filter``).
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests; less for a rig above ``HEAVY``.
             rest_push: by how much the position error of a resting piston is multiplied.
@@ -148,23 +157,137 @@ class AdmittanceController(StagedController):
         force_sensor: bool = True,
         learn: bool = True,
         identified: bool = False,
+        own_beliefs: bool = False,
+        finds_rig: bool = False,
         **gains: float,
     ) -> None:
         gains = checked_gains(self, gains)
-        check_flags({"force_sensor": force_sensor, "learn": learn, "identified": identified})
+        flags = {"force_sensor": force_sensor, "learn": learn, "identified": identified, "own_beliefs": own_beliefs}
+        check_flags({**flags, "finds_rig": finds_rig})
         if identified and force_sensor:
             raise ValueError(f"identified = {identified!r} with a force sensor; allowed: only where force_sensor is False")
+        if finds_rig and not force_sensor:
+            raise ValueError(f"finds_rig = {finds_rig!r} without a force sensor; allowed: only where force_sensor is True")
         if gains.get("yielding", 1.0) > 1:
             raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
         super().__init__(parameters)
+        if finds_rig and self.parameters.linkage.is_rail:
+            raise ValueError(f"finds_rig = {finds_rig!r} on a rail; allowed: only for a rig of two cylinders")
         self.reads_force = self._force_sensor = bool(force_sensor)
         self._learn, self._identified = bool(learn), bool(identified)
-        self._own, self._candidates, self._rows_of_bank = gains, 0, 0
+        self._own, self._candidates, self._rows_of_bank, self._rows = gains, 0, 0, 0
+        self._finds_rig = bool(finds_rig)
+        self._own_beliefs, self._told = bool(own_beliefs or finds_rig), np.zeros((PARAMETERS, 0))
+
+    def believe(self, rig: Parameters | Sequence[Parameters], lanes: Mask | None = None) -> None:
+        """Tell lanes another rig, at any time, which ``reset`` does not take back.
+
+        A lane that runs goes over to it without a jump (``belief``); one that begins anew begins with it.
+
+        Parameters
+        ----------
+        rig : Parameters or sequence of Parameters
+            One rig, or one for each lane that is told. It may differ from the controller's in what the plant computes with,
+            not in its sensors.
+        lanes : array of bool, (N,), or None
+            Which lanes are told; None stands for all. Before the first period there are as many as the mask has, or as there
+            are rigs.
+
+        Raises
+        ------
+        ValueError
+            Without the option ``own_beliefs``, for another number of rigs or lanes, and for a rig that differs in anything that
+            its lane cannot believe, which is named.
+
+        Examples
+        --------
+        >>> import birthsim
+        >>> law = birthsim.make_controller("admittance[own_beliefs=true]")
+        >>> light, heavy = (birthsim.Parameters().replace({"mechanics.mass": mass}) for mass in (2.0, 4.0))
+        >>> law.believe([light, heavy])
+        >>> law.believed("mechanics.mass").tolist()
+        [2.0, 4.0]
+        """
+        if not self._own_beliefs:
+            raise ValueError(f"own_beliefs = {self._own_beliefs!r}; allowed: True, where lanes are told rigs of their own")
+        among = self._told.shape[1] or self._lanes or (1 if isinstance(rig, Parameters) else len(rig))
+        if lanes is None:
+            lanes = np.ones(among, dtype=np.bool_)
+        elif not (self._told.shape[1] or self._lanes):
+            among = len(lanes)
+        if np.shape(lanes) != (among,) or np.asarray(lanes).dtype != np.bool_:
+            raise ValueError(f"lanes = {shown(lanes)}; allowed: an array of {among} times True or False")
+        for one in (rig,) if isinstance(rig, Parameters) else rig:
+            self._require_believable(one)
+        told = parameter_array(rig, int(np.sum(lanes)))
+        if not self._told.shape[1]:
+            self._told = np.repeat(self._p[:, None], among, axis=1)
+        self._told[:, lanes] = told
+        if self._lanes:
+            now = self._beliefs()
+            now.told[:, lanes], now.news[lanes] = told, 1.0
+
+    def believed(self, name: str) -> Array:
+        """What lanes believe in now of a parameter, or of a row that plants compute with, by name, (N,), SI units.
+
+        Raises ``ValueError`` for an unknown name."""
+        row = name.rpartition(".")[2]
+        if row not in PARAMETER_NAMES:
+            raise ValueError(f"name = {shown(name)}{near(row, PARAMETER_NAMES)}; allowed: {', '.join(PARAMETER_NAMES)}")
+        place = PARAMETER_NAMES.index(row)
+        if self._own_beliefs and self._lanes:
+            now: Array = self._beliefs().rig[place].copy()
+            return now
+        return self._told[place].copy() if self._told.shape[1] else np.repeat(self._p[place], max(1, self._lanes))
+
+    @property
+    def found_rig(self) -> dict[str, tuple[Array, Array]]:
+        """Parameter -> what each lane has found of it, (N,), SI units, and the standard deviation of its logarithm, (N,).
+
+        Empty without the option ``finds_rig``, and before the first period."""
+        if not (self._finds_rig and self._lanes):
+            return {}
+        return rig_filter.found(RigFilter(self._memories[-1][self._rows + Belief.size :]), self.parameters)
+
+    def _require_believable(self, rig: Parameters) -> None:
+        own = self.parameters
+        for name in DECLARED:
+            its, mine = value_of(rig, name), value_of(own, name)
+            if its != mine and (name not in plant_parameters() or DECLARED[name].option or DECLARED[name].choices):
+                raise ValueError(f"rig: {name} = {its!r}; allowed: {mine!r}, as the controller was made with")
+
+    def _beliefs(self) -> Belief:
+        return Belief(self._memories[-1][self._rows :][: Belief.size])
+
+    def _remembered(self) -> Array:
+        """What lanes remember besides: ``Memory`` and the bank of candidates."""
+        return self._memories[-1][: self._rows]
+
+    def prepare(self, lanes: int, sampled: bool) -> None:
+        new = (lanes, sampled) != (self._lanes, self._sampled)
+        super().prepare(lanes, sampled)
+        if new:
+            self._tell(np.ones(lanes, dtype=np.bool_))
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        super().reset(lanes)
+        if lanes is not None and self._lanes:
+            self._tell(lanes)
+
+    def _tell(self, lanes: Mask) -> None:
+        """Lanes that begin anew begin with the rig that they were told."""
+        if not self._told.shape[1]:
+            return
+        if self._told.shape[1] != self._lanes:
+            raise ValueError(f"{self._lanes} lanes, and rigs told to {self._told.shape[1]}; allowed: as many")
+        begun = self._beliefs()
+        begun.told[:, lanes], begun.rig[:, lanes] = self._told[:, lanes], self._told[:, lanes]
+        Memory(self._remembered()).inertia.mass[lanes] = self._told[at.MASS, lanes]
 
     @property
     def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
-        follower = Memory(self._memories[-1]).follower
+        follower = Memory(self._remembered()).follower
         return np.stack([follower.across.fraction, follower.along.fraction])
 
     @property
@@ -173,7 +296,7 @@ class AdmittanceController(StagedController):
 
         1 where it is ``identified``, or where nothing weighs it: that takes an acceleration sensor, a controller that learns
         without a force sensor, and positions that are samples."""
-        memory = self._memories[-1]
+        memory = self._remembered()
         if not self._candidates:
             return np.ones((2, memory.shape[1]))
         found: Array = friction_candidates.chances(memory[-self._rows_of_bank :])[friction_candidates.LUGRE]
@@ -191,7 +314,8 @@ class AdmittanceController(StagedController):
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
-        return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
+        mass = self.believed("mass") if self._own_beliefs else self.parameters.mechanics.mass
+        return mass_spring_damper(reference, mass, DAMPING_RATIO)
 
     def controller_stages(self, sampled: bool) -> list[ControllerStage]:
         rig, noisy = self.parameters, sampled
@@ -203,12 +327,12 @@ class AdmittanceController(StagedController):
         kind = "inertial" if inert else "ideal" if not sampled else learning if self._learn else "lab"
         tuned, least, falls = self.TUNED[kind], LEAST_FRACTION, 1.0
         if weighs:
-            lighter = math.sqrt(min(1.0, HEAVY / rig.mechanics.mass))
-            tuned, least, falls = {**tuned, "rest_gain": lighter * tuned["rest_gain"]}, SAMPLED_LEAST, MOST_FALLS
+            least, falls = SAMPLED_LEAST, MOST_FALLS
         g = {**tuned, **self._own}
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
         calmed = {"swing": SWING if self._identified and not inert else 0.0, "least_fraction": least, "most_falls": falls}
-        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **calmed, **g}
+        heavy = HEAVY if weighs and "rest_gain" not in self._own else ANY_MASS
+        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, "heavy": heavy, **calmed, **g}
         self._candidates = (1 if self._identified else friction_candidates.CANDIDATES) if weighed else 0
         candidates = len(friction_observer.BRISTLES) if weighs else self._candidates
         self._rows_of_bank = len(friction_candidates.fresh_bank(candidates))
@@ -232,8 +356,20 @@ class AdmittanceController(StagedController):
             believed_limit=estimator.BELIEVED_LIMIT if inert or fixed else estimator.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )
-        constants = Constants.numbers(**parameters, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
-        own = ControllerStage(law.control, constants, fresh)
+        self._rows = len(fresh)
+        function, remembered = law.control, fresh
+        if self._own_beliefs:
+            function, remembered = law.control_each, np.concatenate([fresh, belief.fresh(self._p)])
+        if self._finds_rig:
+            remembered = np.concatenate([remembered, rig_filter.fresh(rig)])
+        constants = Constants.numbers(
+            **parameters,
+            gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}),
+            rows_of_finder=RigFilter.size if self._finds_rig else 0,
+            cell_noise=board.pressure_noise,
+            spread=rig_filter.spread_of(rig),
+        )
+        own = ControllerStage(function, constants, remembered)
         return [inertial.controller_stage(rig), own] if inert else [own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

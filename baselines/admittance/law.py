@@ -16,10 +16,15 @@ with the forces unseen of ``estimator``: believed friction and what an observer 
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
+import math
+
 from baselines.admittance import estimator
+from baselines.admittance.belief import Belief, believe
+from baselines.admittance.finding import find
 from baselines.admittance.rows import Constants, Estimate, Follower, Gains, Memory, OscillationDetector
 from baselines.backstepping.cartesian_law import across, along, load_rates
 from baselines.estimation.hand.half_wave import sustained
+from baselines.estimation.rig_filter import RigFilter
 from baselines.estimation.rows import AssumedParameters
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
@@ -27,6 +32,8 @@ from birthsim_env.loop.signals import Motion
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.stack import column
 from birthsim_env.physics.dynamics import load
 from birthsim_env.physics.linkage import geometry, mechanics
 
@@ -140,7 +147,8 @@ def command(seen: Seen, memory: Memory, estimate: Estimate, gains: Gains, assume
         fraction_t = gain_fraction(follower.across, i, dt, period, gains)
         fraction_n = gain_fraction(follower.along, i, dn, period, gains)
         follower.moved[i] = max(estimate.inputs.moving[i], follower.moved[i] * exact.exp(-period / MOTION_TIME))
-        c = gains.rest_gain + (gains.gain - gains.rest_gain) * follower.moved[i]
+        resting = gains.rest_gain * math.sqrt(min(1.0, gains.heavy / p.mass))
+        c = resting + (gains.gain - resting) * follower.moved[i]
         c -= memory.stiff_hand.felt[i] * max(0.0, c - HELD_GAIN)
         if gains.swing > 0.0:
             gone = motion_fraction(follower, i, motion, period)
@@ -165,12 +173,36 @@ def command(seen: Seen, memory: Memory, estimate: Estimate, gains: Gains, assume
             seen.opening[valve, i] = lead(wanted, memory.chambers.spool[valve, i], kept, gains.quickness)
 
 
+@helper
+def advance(seen: Seen, whole: Array, estimate: Estimate, constants: Constants) -> int:
+    """One control period of all lanes of ``seen``, whose memory and bank are ``whole``; returns what ``control`` does."""
+    own, bank = estimator.parts(whole, constants)
+    missed = estimator.estimate(seen, own, bank, estimate, constants)
+    command(seen, own, estimate, constants.gains, constants.model)
+    load(seen.opening, 0, own.fresh.shape[0], own.chambers.opening)
+    return missed
+
+
 @kernel
 def control(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are not positive definite."""
     signals, estimate = Seen(seen.rows[:, :n]), Estimate(scratch(Estimate.size)[:, :n])
-    own, bank = estimator.parts(block(memory, int(constants.rows_of_memory))[:, :n], constants)
-    missed = estimator.estimate(signals, own, bank, estimate, constants)
-    command(signals, own, estimate, constants.gains, constants.model)
-    load(signals.opening, 0, n, own.chambers.opening)
+    return advance(signals, block(memory, int(constants.rows_of_memory))[:, :n], estimate, constants)
+
+
+@kernel
+def control_each(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
+    """``control`` where every lane has a belief of its own, behind what it remembers."""
+    rows, found, missed = int(constants.rows_of_memory), int(constants.rows_of_finder), 0
+    believing = rows + Belief.size
+    whole, beliefs = block(memory, rows), Belief(block(memory, believing)[rows:])
+    remembered, _ = estimator.parts(whole, constants)
+    for i in range(n):
+        signals, estimate = Seen(seen.rows[:, i : i + 1]), Estimate(scratch(Estimate.size)[:, :1])
+        own = Constants(column(Constants.size))
+        believe(beliefs, i, remembered, constants, own)
+        if found > 0:
+            finder = RigFilter(block(memory, believing + found)[believing:])
+            find(finder, beliefs, i, seen, remembered, constants, own)
+        missed += advance(signals, whole[:, i : i + 1], estimate, own)
     return missed

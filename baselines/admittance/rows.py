@@ -1,5 +1,6 @@
 """Rows of the admittance law: what it remembers, what it knows at one instant, and its constants."""
 
+from baselines.estimation import rig_filter
 from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.friction_level import Friction
@@ -97,6 +98,7 @@ class Gains(Numbers):
     pneumatic_gain = number("1/s", "c4")
     gain = number("1/s", "c while the motion moves")
     rest_gain = number("1/s", "c while it rests")
+    heavy = number("kg", "mass beyond which c at rest is less by the root of the ratio")
     rest_push = number("1", "weight of a resting piston's position error")
     dead_zone = number("m", "of a resting piston's position error")
     quickness = number("1", "fraction of the way that a spool is taken in a period")
@@ -111,3 +113,6 @@ class Constants(EstimatorParameters):
     """Constants of the stage."""
 
     gains = part(Gains, "of the loop")
+    rows_of_finder = number("1", "rows of the filter that finds the rig; 0 where none does")
+    cell_noise = number("Pa", "standard deviation of a pressure cell")
+    spread = rows(rig_filter.SIZE, "1", "standard deviation of the logarithms of what the filter finds, over rigs")

@@ -20,7 +20,7 @@ def _on_stack(rows: Any, *shape: int) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = cgutils.alloca_once(builder, ir.DoubleType(), size=math.prod(shape))
-        data.align = 8 * min(shape[-1], 8)  # no vector crosses a line of the cache
+        data.align = 8 * min(1 << (shape[-1].bit_length() - 1), 8)  # no vector crosses a line of the cache
         strides = [8 * math.prod(shape[axis + 1 :]) for axis in range(len(shape))]
         sizes = ([context.get_constant(types.intp, size) for size in own] for own in (shape, strides, (8,)))
         made = arrayobj.make_array(array)(context, builder)
