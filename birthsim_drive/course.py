@@ -11,11 +11,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from baselines.identification.experiment import PNEUMATIC, Plan, read_plan
-from baselines.identification.laboratory import STIFFNESS
+from baselines.identification.experiment import MARGIN, PNEUMATIC, STIFFNESS, read_plan
 from birthsim_drive.plain import in_python
-from birthsim_env.loop.signals import REFERENCES, Motion, Reference
-from birthsim_env.parts.points import Through
+from birthsim_env.loop.signals import Motion, Reference
 from birthsim_env.parts.references import minimum_jerk
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -25,9 +23,6 @@ PACE = 0.1
 
 smooth = in_python(minimum_jerk)
 """From 0 to 1, or a derivative."""
-
-MARGIN = 1e-9
-"""s by which a time may lack rounding's share of a period."""
 
 
 @dataclass(frozen=True)
@@ -48,19 +43,9 @@ class Course:
 
 def of_plan(path: Path, rig: Parameters) -> Course:
     """The course of an experiment that ``birthsim identify --propose`` wrote."""
-    return _planned(read_plan(path, rig), rig.electronics.control_period)
-
-
-def _planned(plan: Plan, period: float) -> Course:
-    start = plan.times[0]
-    times = start + period * np.arange(int((plan.times[-1] - start) / period))
-    path = Through(plan.times, plan.target.T, within=False)
-    rows = np.zeros((REFERENCES, len(times)))
-    rows[:8] = np.hstack([path.sample(np.full(1, time)) for time in times])
-    stiffness = np.array([np.interp([*times, times[-1] + period], plan.times, one) for one in plan.asked()])
-    rows[8:10], rows[10:12], rows[12:14] = STIFFNESS, stiffness[:, :-1], np.diff(stiffness) / period
-    held = np.searchsorted(plan.times, times + MARGIN) - 1
-    return Course(rows, np.ascontiguousarray(plan.added[:, held]), period)
+    period = rig.electronics.control_period
+    _, rows, added = read_plan(path, rig).periods(period)
+    return Course(rows, added, period)
 
 
 def of_scenario(environment: str, rig: Parameters, seed: int, duration: float | None, **arguments: Any) -> Course:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from birthsim_env.files import write_text
+from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.parts.courses import check_points
 from birthsim_env.parts.points import Through
 from birthsim_env.parts.stiffness_schedules import SOFTEST, STIFFEST
@@ -50,6 +51,12 @@ SOFT, STIFF = 0.6, 1.4
 PNEUMATIC = (4400.0, 2200.0)
 """N/m asked of the pneumatic stiffness of cylinders 1 and 2 in the mean."""
 
+STIFFNESS = 3000.0
+"""N/m asked of the law in both directions; laws that know no stiffness ignore it."""
+
+MARGIN = 1e-9
+"""s by which a time may lack rounding's share of a period."""
+
 CYCLES = (2.0, 3.0)
 """Times that the stiffness of cylinder 1 and that of cylinder 2 go up and down in a plan."""
 
@@ -78,6 +85,20 @@ class Plan:
         """The pneumatic stiffness (2, T) of every row."""
         held = np.repeat(np.transpose([PNEUMATIC]), len(self.times), axis=1)
         return held if self.stiffness is None else self.stiffness
+
+    def periods(self, period: float) -> tuple[Array, Array, Array]:
+        """Of its K control periods of ``period`` s: times (K,), s, references (15, K), and openings to add (4, K).
+
+        Its rows are those of a multisine, which passes them between two of them; cut to its rows it would jerk there.
+        """
+        start = self.times[0]
+        ends = start + period * np.arange(int((self.times[-1] - start) / period) + 1)
+        times = ends[:-1]
+        rows = np.zeros((REFERENCES, len(times)))
+        rows[:8], rows[8:10] = Through(self.times, self.target.T, within=False).sample(times), STIFFNESS
+        stiffness = np.array([np.interp(ends, self.times, one) for one in self.asked()])
+        rows[10:12], rows[12:14] = stiffness[:, :-1], np.diff(stiffness) / period
+        return times, rows, np.ascontiguousarray(self.added[:, np.searchsorted(self.times, times + MARGIN) - 1])
 
     def write(self, path: Path) -> None:
         """Write the plan as CSV with the columns ``NAMES`` and ``ASKED``."""

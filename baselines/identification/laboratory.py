@@ -7,16 +7,12 @@ import numpy as np
 
 from baselines.bench.resting import RestingRigs
 from baselines.controller import Controller
-from baselines.identification.experiment import PNEUMATIC, Plan
+from baselines.identification.experiment import PNEUMATIC, STIFFNESS, Plan
 from baselines.identification.log.rail_log import on_rail
 from baselines.identification.log.trial import Trial
-from birthsim_env.loop.signals import REFERENCES, Reference
+from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import Part
-from birthsim_env.parts.points import Through
 from birthsim_env.physics.rig.parameters import Parameters
-
-STIFFNESS = 3000.0
-"""N/m asked of the law in both directions; laws that know no stiffness ignore it."""
 
 
 def run_plan(
@@ -47,23 +43,18 @@ def _run(
     tick: Callable[[], Any],
     carry: Callable[[RestingRigs], Part] | None,
 ) -> Trial:
-    # A plan's rows are those of a multisine, which passes them between two of them; cut to its rows it would jerk there.
-    rows, path = np.zeros((REFERENCES, 1)), Through(plan.times, plan.target.T, within=False)
-    rows[:2], rows[8:10], rows[10:12] = plan.target[:, :1], STIFFNESS, np.transpose([PNEUMATIC])
-    loop = RestingRigs([rig], Reference(rows), controller, sensors, seed, name="law")
-    period, start = loop.period, plan.times[0]
-    count = int((plan.times[-1] - start) / period)
+    rest = Reference.lane(position=plan.target[:, 0], stiffness=STIFFNESS, pneumatic_stiffness=PNEUMATIC)
+    loop = RestingRigs([rig], Reference(rest[:, None]), controller, sensors, seed, name="law")
+    period = loop.period
+    times, asked, added = plan.periods(period)
+    count = len(times)
     openings, pressures, positions = np.empty((4, count)), np.empty((4, count)), np.empty((2, count))
 
-    stiffness = np.array([np.interp(start + period * np.arange(count + 1), plan.times, one) for one in plan.asked()])
-
     def follow(k: int) -> None:
-        loop.asked[:8] = path.sample(np.full(1, start + k * period))
-        loop.asked[10:12, 0], loop.asked[12:14, 0] = stiffness[:, k], (stiffness[:, k + 1] - stiffness[:, k]) / period
+        loop.asked[:, 0] = asked[:, k]
 
     def add(k: int) -> None:
-        added = plan.added[:, np.searchsorted(plan.times, start + k * period + 1e-9) - 1]
-        loop.opened[:] = np.clip(loop.opened + added[:, None], -1.0, 1.0)
+        loop.opened[:] = np.clip(loop.opened + added[:, k : k + 1], -1.0, 1.0)
         seen = loop.measurement
         pressures[:, k], positions[:, k], openings[:, k] = seen.pressures[:, 0], seen.position[:, 0], loop.opened[:, 0]
 
@@ -78,6 +69,5 @@ def _run(
     loop.close([follow], [add], [*([carry(loop)] if carry else loop.pipeline.group("plant")), look])
     loop.run(count)
     counted = np.full(2, rig.electronics.encoder_offset) if sensors.startswith("encoders") else None
-    times, forces = start + period * np.arange(count), np.zeros((2, count))
-    trial = Trial(times, openings, pressures, positions, forces, counted=counted)
+    trial = Trial(times, openings, pressures, positions, np.zeros((2, count)), counted=counted)
     return on_rail(trial, rig) if rig.linkage.is_rail else trial

@@ -105,10 +105,10 @@ def start_of(path: Path | None, bounds: Bounds) -> Gains:
     return {name: float(gains[name]) for name in bounds}
 
 
-def probes(rig: Parameters, lanes: int) -> StiffnessTest:
+def probes(rig: Parameters, lanes: int, seed: int = WORLDS) -> StiffnessTest:
     """Stiffness tests on drawn rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y, or along a rail."""
-    rigs = [draw_parameters(rig, documented_ranges(rig), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
-    rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
+    rigs = [draw_parameters(rig, documented_ranges(rig), stream(seed + lane, 0, "parameters")) for lane in range(lanes)]
+    rng, lane = np.random.default_rng(seed), np.arange(lanes)
     size, stiffness = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes), np.zeros((3, lanes))
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
     if rig.linkage.is_rail:

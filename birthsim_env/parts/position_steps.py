@@ -1,18 +1,14 @@
 """Positions that are held one after the other, on a line; every move between two is a minimum-jerk step."""
 
-import copy
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Self
 
 import numpy as np
 
-from birthsim_env.loop.loop import sampled
-from birthsim_env.loop.rows import REFERENCE, Seen
-from birthsim_env.loop.signals import Motion
+from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.stage import Stage, numbers, table2
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
-from birthsim_env.parts.references import FARTHEST, LONGEST, SHORTEST, TURNED, Trajectory, minimum_jerk
+from birthsim_env.parts.references import FARTHEST, LONGEST, SHORTEST, Planned, minimum_jerk, require_line
 from birthsim_env.parts.times import Timed
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import kernel
@@ -53,7 +49,7 @@ def _steps(world: int, seen: Seen, memory: int, constants: int, tables: int, lan
     return 0
 
 
-class PositionSteps(Trajectory):
+class PositionSteps(Planned):
     """From ``middle`` to one place on a line after the other, at rest between moves.
 
     Parameters
@@ -83,11 +79,7 @@ class PositionSteps(Trajectory):
         places: Sequence[Range] = (0.05,),
         lasts: float = 1.0,
     ) -> None:
-        if not (isinstance(middle, tuple) and len(middle) == 2):
-            raise ValueError(f"middle = {shown(middle)}; allowed: (x, y) (m)")
-        for coordinate in middle:
-            checked_number("middle", coordinate, "m", least=-FARTHEST, most=FARTHEST)
-        checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
+        require_line(middle, heading)
         checked_number("lasts", lasts, "s", least=SHORTEST, most=LONGEST)
         for name, column in (("starts", starts), ("places", places)):
             if not (isinstance(column, (tuple, list)) and len(column) > 0):
@@ -104,25 +96,14 @@ class PositionSteps(Trajectory):
         self.timed = Timed(np.empty(0), float(starts[0]))
 
     def prepare(self, num_envs: int) -> None:
-        self._places: Array = np.zeros((len(self.places), num_envs))
+        self._own = np.zeros((len(self.places), num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        put(self._places, lane, [draw(place, rng) for place in self.places])
-
-    def some(self, lanes: Any) -> Self:
-        """The same for lanes (L,) alone."""
-        few = copy.copy(self)
-        few._places = self._places.take(lanes, axis=1)
-        return few
-
-    @vectorised
-    def sample(self, time: Array) -> Array:
-        return sampled(self.stage(), time, REFERENCE, Motion.size)
+        put(self._own, lane, [draw(place, rng) for place in self.places])
 
     def stage(self) -> Stage:
-        """``sample``, compiled into the closed loop."""
         starts: Array = np.array(self.starts, dtype=np.float64)
         direction = exact.direction(self.heading)
         constants = Moves.numbers(middle=self.middle, direction=direction, lasts=self.lasts, starts=starts)
-        return Stage(_steps, constants, tables=(self._places,))
+        return Stage(_steps, constants, tables=(self._own,))

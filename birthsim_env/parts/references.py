@@ -74,13 +74,10 @@ class Trajectory(Staged):
         )
 
 
-class _Planned(Trajectory):
-    """A trajectory that follows from a few numbers per lane, ``_own`` (rows, N): their layout, and what follows, a kernel."""
+class Planned(Trajectory):
+    """A trajectory that a compiled ``stage`` works out of a few numbers per lane, ``_own`` (rows, N)."""
 
-    planned: tuple[type[Rows], Callable[..., int]]
-
-    def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((self.planned[0].size, num_envs))
+    _own: Array
 
     def some(self, lanes: Any) -> Self:
         """The same for lanes (L,) alone."""
@@ -94,7 +91,33 @@ class _Planned(Trajectory):
 
     def stage(self) -> Stage:
         """``sample``, compiled into the closed loop."""
+        raise NotImplementedError(f"{type(self).__name__}.stage() is missing; it returns a Stage with ``_own`` as its table")
+
+
+class _Drawn(Planned):
+    """One that has nothing else: the layout of its numbers, and what follows, a kernel."""
+
+    planned: tuple[type[Rows], Callable[..., int]]
+
+    def prepare(self, num_envs: int) -> None:
+        self._own = np.zeros((self.planned[0].size, num_envs))
+
+    def stage(self) -> Stage:
         return Stage(self.planned[1], tables=(self._own,))
+
+
+def require_line(middle: tuple[float, float], heading: float) -> None:
+    """Raise ``ValueError`` for a ``middle``, m, or a ``heading``, rad, of no line in reach."""
+    require_point("middle", middle)
+    checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
+
+
+def require_point(name: str, point: tuple[float, float]) -> None:
+    """Raise ``ValueError`` for what is no (x, y), m, in reach."""
+    if not (isinstance(point, tuple) and len(point) == 2):
+        raise ValueError(f"{name} = {shown(point)}; allowed: (x, y) (m)")
+    for coordinate in point:
+        checked_number(name, coordinate, "m", least=-FARTHEST, most=FARTHEST)
 
 
 class Round(Rows):
@@ -118,7 +141,7 @@ def _circle(world: int, seen: Seen, memory: int, constants: int, tables: int, la
     return 0
 
 
-class Circle(_Planned):
+class Circle(_Drawn):
     """A circle at constant speed, which starts at its rightmost point.
 
     Parameters
@@ -147,10 +170,7 @@ class Circle(_Planned):
     planned = Round, _circle
 
     def __init__(self, centre: tuple[float, float] = (0.5, 0.0), radius: Range = 0.05, period: Range = 4.0) -> None:
-        if not (isinstance(centre, tuple) and len(centre) == 2):
-            raise ValueError(f"centre = {shown(centre)}; allowed: (x, y) (m)")
-        for coordinate in centre:
-            checked_number("centre", coordinate, "m", least=-FARTHEST, most=FARTHEST)
+        require_point("centre", centre)
         checked_range("radius", radius, "m", least=0.0, most=FARTHEST)
         checked_range("period", period, "s", least=-LONGEST, most=LONGEST)
         if np.min(period) < SHORTEST and np.max(period) > -SHORTEST:
@@ -186,7 +206,7 @@ def _sine(world: int, seen: Seen, memory: int, constants: int, tables: int, lane
     return 0
 
 
-class Sine(_Planned):
+class Sine(_Drawn):
     """To and fro along a line, a sine of time, from its middle on.
 
     Parameters
@@ -211,11 +231,7 @@ class Sine(_Planned):
     def __init__(
         self, middle: tuple[float, float] = (0.5, 0.0), heading: float = 0.0, amplitude: Range = 0.05, period: Range = 4.0
     ) -> None:
-        if not (isinstance(middle, tuple) and len(middle) == 2):
-            raise ValueError(f"middle = {shown(middle)}; allowed: (x, y) (m)")
-        for coordinate in middle:
-            checked_number("middle", coordinate, "m", least=-FARTHEST, most=FARTHEST)
-        checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
+        require_line(middle, heading)
         checked_range("amplitude", amplitude, "m", least=0.0, most=FARTHEST)
         checked_range("period", period, "s", least=SHORTEST, most=LONGEST)
         self.middle, self.amplitude, self.period = middle, amplitude, period
@@ -281,7 +297,7 @@ def _path(world: int, seen: Seen, memory: int, constants: int, tables: int, lane
     return 0
 
 
-class Path(_Planned):
+class Path(_Drawn):
     """A straight line, then an arc, at minimum jerk along the whole; at rest before ``begins`` and after ``ends``.
 
     Numbers may be ranges (low, high), from which every episode draws, but for the times.

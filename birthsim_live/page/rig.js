@@ -1,5 +1,5 @@
 // The linkage: cylinders, pins, fetal head and the column that carries them (birthsim_env/drawing/rig.py).
-// Every dimension and the outline of the head come from Python. `first` is the first cylinder that there is: 1 on a rail.
+// Every dimension and the outline of the head come from Python. `cylinders` are those that there are, counted from 0: [1] on a rail.
 
 import { Axis, CAP, FAINT, GROUND, GROUND_EDGE, INK, LINE, PAPER, SKIN, SKIN_EDGE, STEEL, finite } from "./pen.js";
 
@@ -28,20 +28,20 @@ export function extent(geometry) {
 }
 
 /** Workspace of the end effector and the column. */
-export function drawGround(pen, geometry) {
+export function drawGround(pen, geometry, cylinders) {
   pen.polygon(geometry.workspace, GROUND, GROUND_EDGE);
-  if (geometry.first) return;
+  if (!cylinders.includes(0)) return;
   const column = new Axis([0, 0], [Math.cos(geometry.gamma3), Math.sin(geometry.gamma3)]);
   const half = 0.8 * geometry.barrels[1].half_bore;
   pen.polygon(column.box(-2 * half, geometry.d3 + 2 * half, half), FAINT, LINE);
 }
 
 /** Everything that moves; `colours` of the chambers P1, N1, P2, N2. */
-export function drawRig(pen, pose, geometry, colours) {
-  const { first } = geometry;
-  const pins = [[0], first ? [0] : [0, geometry.d6]];
-  geometry.barrels.forEach((barrel, i) => {
-    if (i < first) return;
+export function drawRig(pen, pose, geometry, cylinders, colours) {
+  const both = cylinders.length > 1;
+  const pins = [[0], both ? [0, geometry.d6] : [0]];
+  for (const i of cylinders) {
+    const barrel = geometry.barrels[i];
     const front = frontOf(barrel);
     for (const at of pins[i]) {
       // Where a pin lies beyond the barrel, a lug on the barrel carries it.
@@ -49,10 +49,10 @@ export function drawRig(pen, pose, geometry, colours) {
       const ends = at < barrel.rear ? [at, barrel.rear] : [front, at];
       pen.polygon(pose.axes[i].box(...ends, 0.6 * barrel.half_bore), CAP, INK);
     }
-  });
-  for (const i of [1, 0].filter((one) => one >= first)) drawCylinder(pen, pose.axes[i], geometry.barrels[i], pose.piston[i], colours.slice(2 * i, 2 * i + 2));
+  }
+  for (const i of [...cylinders].reverse()) drawCylinder(pen, pose.axes[i], geometry.barrels[i], pose.piston[i], colours.slice(2 * i, 2 * i + 2));
   const pin = 0.45 * pen.scale * geometry.barrels[1].half_bore;
-  for (const place of [pose.axes[1].origin, ...(first ? [] : [pose.axes[0].origin, pose.joint])]) {
+  for (const place of [pose.axes[1].origin, ...(both ? [pose.axes[0].origin, pose.joint] : [])]) {
     pen.disc(place, 1.6 * pin, CAP, INK);
     pen.disc(place, 0.8 * pin, STEEL, INK);
   }
@@ -93,9 +93,9 @@ function drawHead(pen, axis, head) {
 }
 
 /** P1, N1, P2, N2 and their places, m: `away` m beside the barrels, on the sides that face away from each other. */
-export function chamberNames(pose, geometry, away) {
-  return geometry.barrels.flatMap((barrel, i) => {
-    if (i < geometry.first) return [];
+export function chamberNames(pose, geometry, cylinders, away) {
+  return cylinders.flatMap((i) => {
+    const barrel = geometry.barrels[i];
     const aside = (i === 0 ? 1 : -1) * (1.25 * barrel.half_bore + away);
     const axis = pose.axes[i];
     return [

@@ -33,8 +33,8 @@ export class Scene {
     pen.onNightfall(() => this.layOut());
   }
 
-  setUp({ geometry, air, guide, drag_limit: limit }) {
-    Object.assign(this, { geometry, air, guide, limit });
+  setUp({ geometry, air, cylinders, guide, drag_limit: limit }) {
+    Object.assign(this, { geometry, air, cylinders, guide, limit });
     this.layOut();
   }
 
@@ -96,7 +96,7 @@ export class Scene {
     const ground = new Pen(context, origin, scale);
     context.fillStyle = pen.PAPER;
     context.fillRect(0, 0, width, height);
-    drawGround(ground, this.geometry);
+    drawGround(ground, this.geometry, this.cylinders);
     const [left, foot, length] = [2 * MARGIN, height - MARGIN, 0.1 * scale];
     context.beginPath();
     for (const [x, y] of [[left, foot - 4], [left, foot], [left + length, foot], [left + length, foot - 4]]) context.lineTo(x, y);
@@ -130,14 +130,15 @@ export class Scene {
   draw(frame, { held, lens, ghost, mean }) {
     if (!this.pen || this.hidden) return;
     this.sheet.check();
-    const { pen: world, unit, geometry } = this;
+    const { pen: world, unit, geometry, cylinders } = this;
     this.sheet.lay(this.backdrop);
     world.context.lineJoin = "miter";
     world.line(this.path, pen.PATH, 2 * unit);
     const pose = poseOf(frame, geometry);
     const { supply, atmosphere } = this.air;
     if (pose) {
-      drawRig(world, pose, geometry, frame.pressures.map((p) => pen.airColour((p - atmosphere) / (supply - atmosphere))));
+      const colours = frame.pressures.map((p) => pen.airColour((p - atmosphere) / (supply - atmosphere)));
+      drawRig(world, pose, geometry, cylinders, colours);
     }
     world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
     this.trail.draw(world, pen.INK, 1.6 * unit);
@@ -207,7 +208,7 @@ export class Scene {
 
   drawNames(pose) {
     const away = 9 / this.pen.scale;
-    for (const [name, place] of chamberNames(pose, this.geometry, away)) {
+    for (const [name, place] of chamberNames(pose, this.geometry, this.cylinders, away)) {
       this.pen.text(name, this.pen.pixel(place), { weight: 700 });
     }
   }

@@ -87,7 +87,6 @@ def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str
             "pivot1": [g.d3 * math.cos(g.gamma3), g.d3 * math.sin(g.gamma3)],
             "pivot2": [0.0, 0.0],
             **{name: getattr(g, name) for name in ("d3", "d6", "k1", "k2", "gamma3")},
-            "first": rig.linkage.topology.cylinders[0],
             "half_stroke1": rig.cylinder1.stroke / 2,
             "half_stroke2": rig.cylinder2.stroke / 2,
             **shapes(rig),

@@ -21,6 +21,7 @@ from birthsim_env.parts.sensors.noise import noise_of
 from birthsim_env.parts.sensors.readings import (
     Readings,
     converted,
+    has_sensors,
     is_read,
     seen_again,
     sense_acceleration,
@@ -63,7 +64,7 @@ def count(
         place1 = world.state[at.Y1, i] + e.offset[0, i] + noise_of(key, tick, COUNTED, noise)
         place2 = world.state[at.Y2, i] + e.offset[1, i] + noise_of(key, tick, COUNTED + 1, noise)
         y1, y2 = converted(place1, step, -FARTHEST, FARTHEST), converted(place2, step, -FARTHEST, FARTHEST)
-        y1 *= world.rig[at.FREE, i]  # a locked cylinder has no encoder: where it is locked is known
+        y1 *= has_sensors(world, 0, i)  # it is locked at 0
         tracker.take(queue, i, time, shared.encoder_rate, y1, y2)
         if tick == 0:
             tracker.start(queue, arrived, i, y1, y2, world.state[at.V1, i], world.state[at.V2, i])

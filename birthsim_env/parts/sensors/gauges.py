@@ -33,6 +33,7 @@ from birthsim_env.parts.sensors.joint_board import (
 )
 from birthsim_env.parts.sensors.readings import (
     Readings,
+    has_sensors,
     is_read,
     late_force,
     seen_again,
@@ -100,9 +101,9 @@ def sense_rods(
     carried_x, carried_y = mass * ax - hand_x, mass * (ay + p[at.GRAVITY, i]) - hand_y
     noise, step = joint.parameters.gauge_noise[i], e.force_step[i] * (shared.gauge_range / shared.force_range)
     rod1, rod2 = mechanics.user_force1(carried_x, carried_y, kappa, sine, cosine), sine * carried_x - cosine * carried_y
-    sensed1, sensed2 = rod1 + joint.gain[0, i] * rod1 + joint.bias[0, i], rod2 + joint.gain[1, i] * rod2 + joint.bias[1, i]
-    full = shared.gauge_range
-    told1 = late_force(sensed1, 0, passed, late, e, shared, key, tick, again, i, noise, step, full)
+    sensed2, full, errs = rod2 + joint.gain[1, i] * rod2 + joint.bias[1, i], shared.gauge_range, has_sensors(world, 0, i)
+    sensed1 = rod1 + joint.gain[0, i] * rod1 * errs + joint.bias[0, i] * errs
+    told1 = late_force(sensed1, 0, passed, late, e, shared, key, tick, again, i, noise * errs, step * errs, full)
     told2 = late_force(sensed2, 1, passed, late, e, shared, key, tick, again, i, noise, step, full)
     if not again:
         rods.velocity[0, i], rods.velocity[1, i] = vx, vy

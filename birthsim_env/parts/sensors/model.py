@@ -14,7 +14,7 @@ from birthsim_env.loop.rows import AT_VALVE, FORCE, MOTION, STATE, TICK, Signals
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, Staged
 from birthsim_env.parts.drawn.seeding import vectorised
-from birthsim_env.physics.compiled.lanes import PRESSURES, Y1, Array
+from birthsim_env.physics.compiled.lanes import FREE, PRESSURES, Y1, Array
 from birthsim_env.physics.electronics import Electronics
 from birthsim_env.registry import entries, entry
 
@@ -78,7 +78,7 @@ class SensorModel(Staged):
         pistons : array (4, N), optional
             y1, v1, y2, v2 of both pistons, m and m/s, for what is measured at the cylinders.
         rig : array (PARAMETERS, N), optional
-            The rig's parameters, ``Plant.lane_parameters``, likewise.
+            The rig's parameters, ``Plant.lane_parameters``, likewise; by default both cylinders move.
         """
         stage = self.stage()
         if stage is None:
@@ -89,7 +89,8 @@ class SensorModel(Staged):
         Signals(seen).time[:] = time
         cells = [(pressures, AT_VALVE), *((pressures[[k]], STATE + row) for k, row in enumerate(PRESSURES))]
         world = [(ticks[None], TICK), (motion, MOTION), (force, FORCE), *cells]
-        world += [(one, row) for one, row in ((pistons, STATE + Y1), (rig, 0)) if one is not None]
+        world += [(np.ones((1, len(time))), FREE) if rig is None else (rig, 0)]
+        world += [] if pistons is None else [(pistons, STATE + Y1)]
         placed = [(np.ascontiguousarray(array, dtype=np.float64), row) for array, row in world]
         Loop(len(time), placed, [(seen, 0)], [stage]).run()
         return measurement_of(seen, self.sampled, self.tells_acceleration)

@@ -10,6 +10,7 @@ from birthsim_env.parts.sensors.cells import pressure_at_cell
 from birthsim_env.parts.sensors.noise import happens, noise_of
 from birthsim_env.parts.sensors.sensor_errors import Errors, Shared
 from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
@@ -124,13 +125,24 @@ def sense_acceleration(
 
 
 @helper
+def has_sensors(world: World, cylinder: int, i: int) -> float:
+    """1 where a cylinder moves, and 0 where it is locked, as the first one of a rail is: it has no sensors that could err.
+
+    What laws read of it all the same is what is there, which does not change.
+    """
+    return world.rig[at.FREE, i] if cylinder == 0 else 1.0
+
+
+@helper
 def sense_pressures(world: World, readings: Readings, e: Errors, shared: Shared, key: np.uint64, i: int) -> None:
     """Read the pressure cells."""
     tick = int(world.tick[i])
     for chamber in range(4):
-        noise = noise_of(key, tick, chamber, e.parameters.pressure_noise[i])
-        value = pressure_at_cell(world, chamber, i) + e.cells[chamber, i] + noise
-        readings.pressure[chamber, i] = converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
+        value = pressure_at_cell(world, chamber, i)
+        if has_sensors(world, chamber // 2, i) > 0.0:
+            noise = noise_of(key, tick, chamber, e.parameters.pressure_noise[i])
+            value = converted(value + e.cells[chamber, i] + noise, e.pressure_step[i], 0.0, shared.pressure_range)
+        readings.pressure[chamber, i] = value
 
 
 @helper

@@ -7,9 +7,9 @@ import numpy as np
 from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.probes import HOLD, POSES, REST, RISE, WINDOW, RampedForces
 from baselines.bench.resting import RestingRigs
-from baselines.identification.experiment import PNEUMATIC, propose
+from baselines.identification.experiment import PNEUMATIC, STIFFNESS, propose
 from baselines.identification.identified import MISFIT, identify
-from baselines.identification.laboratory import STIFFNESS, run_plan
+from baselines.identification.laboratory import run_plan
 from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Reference
