@@ -87,7 +87,7 @@ def observed(rig: Parameters, index: float, chamber: int, openings: Array) -> Ar
 def test_sensitivities_of_pressures_are_their_derivatives(chamber):
     # Openings beyond the overlap, where the valve's curve is smooth; the valve is opened and shut once.
     openings = np.concatenate([np.linspace(0.2, 0.6, 10), np.linspace(-0.3, -0.7, 10)])
-    rig = Parameters().replace({"chambers.dead_volume": 1e-5})  # said, it does not grow with the bores
+    rig, dead = Parameters(), "chambers.dead_volume"
     own, p = filtered(rig), Rig(parameter_column(rig))
     own.pressure[:], own.spool[:] = 3e5, 0.0
     joints = Joints(np.zeros((Joints.size, 1)))
@@ -101,7 +101,9 @@ def test_sensitivities_of_pressures_are_their_derivatives(chamber):
         found.append(own.sensitivity[first : first + rig_filter.OF_CHAMBER, 0] / (1.0 - rig_filter.TRUST))
     step, derivatives = 1e-5, []
     for name in ("air.supply_pressure", bore, "valves.time_constant", "chambers.dead_volume"):
-        near = [rig.replace({name: value_of(rig, name) * np.exp(side * step)}) for side in (1.0, -1.0)]
+        # What is not said of the dead volume follows the bores.
+        sizes = {dead: value_of(rig, dead)}
+        near = [rig.replace(sizes | {name: value_of(rig, name) * np.exp(side * step)}) for side in (1.0, -1.0)]
         more, less = (observed(one, index, chamber, openings) for one in near)
         derivatives.append((more - less) / (2 * step))
     more, less = (observed(rig, index * np.exp(side * step), chamber, openings) for side in (1.0, -1.0))
