@@ -139,6 +139,8 @@ def pytest_terminal_summary(terminalreporter):
 def pytest_itemcollected(item):
     if item.nodeid.startswith("tests/fuzz/"):
         item.add_marker("fuzz")
+    if item.get_closest_marker("weekly"):
+        item.add_marker("slow")
 
 
 TOGETHER = {

@@ -58,7 +58,7 @@ def rows_of(request):
     return request.getfixturevalue(request.param)
 
 
-@pytest.mark.parametrize("place", ["in_node", "in_c", pytest.param("on_aarch64", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("place", ["in_node", "in_c", pytest.param("on_aarch64", marks=pytest.mark.weekly)])
 @pytest.mark.parametrize(("sensors", "controller"), CASES)
 def test_a_closed_loop(request, place, sensors, controller):
     make = "loop", {"scenario": "circle", "sensors": sensors, "controller": controller}

@@ -185,12 +185,20 @@ def test_a_hundred_thousand_threads():
     assert len(np.unique(simulation.plant.state[0])) > 99_000
 
 
+PREDICTIVE = "nonlinear-mpc"
+"""What needs most memory."""
+
+
 @pytest.mark.slow
-def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
-    """Of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
-    pairs = itertools.product(registry.names("scenario"), registry.names("sensors"))
+@pytest.mark.parametrize(
+    "laws", [("residual:circle", PREDICTIVE), pytest.param((), id="all", marks=pytest.mark.weekly)], ids=["some", "all"]
+)
+def test_ptx_of_stages_is_exact_and_alone(laws, tmp_path):
+    """Of scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
+    scenarios = ("probe",) if laws else registry.names("scenario")
+    pairs = itertools.product(scenarios, registry.names("sensors"))
     made = [begun(2, scenario, sensors=sensors) for scenario, sensors in pairs]
-    laws = (*compiled_names(listed=True), "residual:circle")
+    laws = laws or (*compiled_names(listed=True), "residual:circle")
     made += [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
     functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
     compile_object(sorted(functions | LOOKS), "ptx", tmp_path / "all.o", threads=threads.Threads(1024))

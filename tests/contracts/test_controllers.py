@@ -14,6 +14,7 @@ from baselines.inputs import COMMAND_OPTIONS
 from baselines.named import LIMITED, known_options, make_controller, resolved, uncontrolled_names
 from birthsim_env import Parameters, Reference
 from birthsim_env.registry import names
+from tests.covering import thinned
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 
@@ -25,8 +26,11 @@ IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 LAWS = [*CHOICES, IDENTIFIED, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 NAMES = [*LAWS, *POLICIES]
 # The code of a policy is that of ``residual``: what differs are its weights and the law inside.
-PAIRS = [*itertools.product(LAWS, names("sensors")), *zip(POLICIES, itertools.cycle(names("sensors")), strict=False)]
-CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name, sensors in PAIRS]
+PAIRS = [
+    *thinned(LAWS, names("sensors")),
+    *((*pair, ()) for pair in zip(POLICIES, itertools.cycle(names("sensors")), strict=False)),
+]
+CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=marks) for name, sensors, marks in PAIRS]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 CONTROLLED = [name for name in NAMES if name not in uncontrolled_names()]
 
