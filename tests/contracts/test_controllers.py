@@ -25,10 +25,13 @@ CHOICES = [name for name in names("controller") if name != "admittance"]  # whic
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 LAWS = [*CHOICES, IDENTIFIED, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 NAMES = [*LAWS, *POLICIES]
-# The code of a policy is that of ``residual``: what differs are its weights and the law inside.
+# The code of a policy is that of ``residual``: what differs are its weights and the law inside. A commit takes one on a law,
+# one on the valves, and one that remembers.
+OFTEN = ("circle", "circle_lab_apg", "circle_honest_student")
+SELDOM = [() if name in OFTEN else (pytest.mark.weekly,) for name in names("policy")]
 PAIRS = [
     *thinned(LAWS, names("sensors")),
-    *((*pair, ()) for pair in zip(POLICIES, itertools.cycle(names("sensors")), strict=False)),
+    *zip(POLICIES, itertools.cycle(names("sensors")), SELDOM, strict=False),
 ]
 CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=marks) for name, sensors, marks in PAIRS]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))

@@ -43,9 +43,17 @@ LAW_LOOPS = {
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
 FAST = ("a hand that feels",)
+WEEKLY = ("informed",)
+"""Trainings of such policies go back through it on every commit."""
 
 
-@pytest.mark.parametrize("name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in LOOPS])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.weekly if name in WEEKLY else () if name in FAST else pytest.mark.slow)
+        for name in LOOPS
+    ],
+)
 def test_gradients_are_differences(name: str) -> None:
     """To actions and state over four policy steps, randomised rigs: median 1e-7; what is farther off stands on kinks."""
     off, equal = compared(begun(lanes=40, **LOOPS[name]))
