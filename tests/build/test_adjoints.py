@@ -69,8 +69,8 @@ def back_here(made, bars):
     "case",
     [
         "openings",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("honest sensors", "a hand that feels")),
-        pytest.param("a law", marks=pytest.mark.weekly),
+        pytest.param("a hand that feels", marks=pytest.mark.slow),
+        *(pytest.param(name, marks=pytest.mark.weekly) for name in ("honest sensors", "a law")),
     ],
 )
 def test_a_thread_goes_back_as_a_lane(case, lanes, device):
@@ -97,6 +97,7 @@ def test_a_thread_goes_back_as_a_lane(case, lanes, device):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_webassembly_goes_back_with_the_same_bits(tmp_path):
     need_linker()
     need_program("node", "nodejs")
@@ -122,7 +123,9 @@ def test_webassembly_goes_back_with_the_same_bits(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [pytest.param(name, marks=pytest.mark.weekly if name == "a law" else ()) for name in CASES])
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=pytest.mark.weekly if name in ("honest sensors", "a law") else ()) for name in CASES]
+)
 def test_the_way_back_is_exact_and_alone(tmp_path, case):
     need_threads()
     here = made(3, **CASES[case])

@@ -178,7 +178,7 @@ def test_a_thread_computes_the_bits_of_a_lane(loop, lanes):
 
 @pytest.mark.slow
 def test_a_hundred_thousand_threads():
-    simulation, pieces, made = both(100_000, sensors="lab")
+    simulation, pieces, made = both(100_000, **CASES["openings"])
     simulation.step(simulation.action)
     assert made.advance(simulation.periods) == 0
     assert differing(pieces, made) == []

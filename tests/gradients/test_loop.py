@@ -43,8 +43,8 @@ LAW_LOOPS = {
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
 FAST = ("a hand that feels",)
-WEEKLY = ("informed",)
-"""Trainings of such policies go back through it on every commit."""
+WEEKLY = ("informed", "admittance-adaptive, tracker-gauges")
+"""The dearest: on every commit a training goes back through the one, and the law of the other has an accelerometer."""
 
 
 @pytest.mark.parametrize(

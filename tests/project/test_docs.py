@@ -197,7 +197,7 @@ def built(tmp_path_factory):
 
     @cache
     def folder_with(run):
-        folder, left = tmp_path_factory.mktemp("site"), ",".join(page for page in NOTEBOOKS if page not in run)
+        folder, left = tmp_path_factory.mktemp("site"), ",".join(f"{page}.md" for page in NOTEBOOKS if page not in run)
         options = [
             "--fail-on-warning",
             "--keep-going",
