@@ -43,8 +43,17 @@ LAW_LOOPS = {
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
 FAST = ("a hand that feels",)
-WEEKLY = ("informed", "admittance-adaptive, tracker-gauges")
-"""The dearest: on every commit a training goes back through the one, and the law of the other has an accelerometer."""
+OFTEN = {
+    "backstepping-cartesian",
+    "backstepping-integral",
+    "abry",
+    "admittance-sensorless",
+    "sliding-mode",
+    "adrc",
+    "time-delay",
+}
+"""Laws of which a commit compiles derivatives, beside those of the scenarios' loops; the others weekly."""
+WEEKLY = {"informed", *(name for name in LAW_LOOPS if name.partition(",")[0] not in {*OFTEN, "limited:pid"})}
 
 
 @pytest.mark.parametrize(
