@@ -186,6 +186,9 @@ NOTEBOOKS = [page for page, text in PAGES.items() if "{code-cell}" in text]
 BRIEF = ("tutorials/first_episode",)
 """Notebooks that a commit runs; the others weekly."""
 
+LARGE = ("comparison", "reference/environments", "reference/commands")
+"""Pages of which each takes axe half a minute."""
+
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
@@ -239,12 +242,19 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(built, run):
 
 @pytest.mark.slow
 @axe.NEEDED
-@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.weekly)])
-def test_axe_finds_nothing_on_the_site(site, page_of, theme):
+@pytest.mark.parametrize(
+    ("theme", "pages"),
+    [
+        ("light", ("index", "tutorials/first_episode")),
+        pytest.param("light", LARGE, marks=pytest.mark.weekly),
+        pytest.param("dark", ("index", "tutorials/first_episode", *LARGE), marks=pytest.mark.weekly),
+    ],
+)
+def test_axe_finds_nothing_on_the_site(site, page_of, theme, pages):
     page = page_of("")
     page.emulate_media(color_scheme=theme)
     with browser.served(site) as url:
-        for name in ("index", "tutorials/first_episode", "comparison", "reference/environments", "reference/commands"):
+        for name in pages:
             page.goto(f"{url}{name}.html")
             assert axe.violations(page, "iframe") == [], name
 

@@ -69,7 +69,7 @@ DERIVED = {"_directions", "_answer", "_forward", "_backward", "adjoint"}
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "kernels"),
-    [("physics", {"adjoint"}), pytest.param("train by gradients", DERIVED, marks=pytest.mark.weekly)],
+    [("physics", {"_directions"}), pytest.param("train by gradients", DERIVED, marks=pytest.mark.weekly)],
 )
 def test_a_path_asks_for_the_same_again(path, kernels, tmp_path):
     """What it has left, a policy and derivatives that were traced, would ask for less."""
