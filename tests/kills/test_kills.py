@@ -27,7 +27,7 @@ ENDINGS = {
 }  # fmt: skip
 """Signal, whether the whole group gets it as from a terminal, and how often."""
 SCENARIOS = (*ENDINGS, "disk full", "two at once")
-EACH = ("evaluate", "search", "onnx", "fmu", "tune", "parquet", "mcap")
+EACH = ("evaluate", "onnx", "fmu", "tune", "parquet", "mcap")
 """Commands that a commit disturbs, so that each scenario and each kind of result is met; the others weekly."""
 BETWEEN = 0.3
 """s at most between the two of Ctrl-C twice."""
