@@ -164,6 +164,7 @@ def hidden() -> Identified:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_where_noise_hides_friction_the_owners_law_is_kept(hidden: Identified) -> None:
     assert hidden.laws.chosen == "lugre"
     assert hidden.laws.rivals
@@ -171,6 +172,7 @@ def test_where_noise_hides_friction_the_owners_law_is_kept(hidden: Identified) -
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_what_the_log_cannot_tell_keeps_the_owners_value(hidden: Identified, tmp_path: Path) -> None:
     """No log tells then how a bristle is damped."""
     rows = {row.name: row for row in hidden.rows}
