@@ -144,6 +144,7 @@ def test_a_recipe_is_all_that_it_takes(recipe, performed):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_controller_that_is_registered_makes_no_result_stale(tree, performed):
     line = ("-m", "birthsim", "study", "status")
     (status, said), (plain, before) = (run_in(place, *line) for place in (performed("controller"), tree))
