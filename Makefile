@@ -4,7 +4,7 @@
 # make portable runs tests of bits as other processors would, make oldest with the oldest Numba
 # make fuzz tries odd input on everything that is read or called, and make kills disturbs every command at random moments (hours)
 # make mutation changes physics and controllers to see whether a test fails (hours); make soak runs 10^8 policy steps (half an hour)
-# make test-weekly runs tests too slow for every commit, and real clients, each in an environment of its own (half an hour or so)
+# make test-weekly runs tests too slow for every commit, and real clients, each in an environment of its own (an hour or two)
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds, of built code too
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make results runs every study whose result is stale, and writes the tables and pictures that show them
@@ -135,7 +135,9 @@ quick: $(READY)
 
 # Tests marked weekly; then each client in a virtual environment of its own, with the wheel; none is left. CLIENTS="sb3 rllib" names some.
 test-weekly: $(READY)
+	$(BIN)/python -m tests.warming
 	$(PYTEST) -m weekly
+	HYPOTHESIS_PROFILE=weekly $(PYTEST) -m "not slow" tests/fuzz
 	python3 -m lab.studies.clients $(CLIENTS)
 
 portable: $(READY)

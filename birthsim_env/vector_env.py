@@ -59,7 +59,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, RecursionError):  # the last from a list in a list in a list ...
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
         made = entry("device", device).made

@@ -1,5 +1,6 @@
 """How Sphinx builds docs/ into a site (`make docs`): MyST Markdown, notebooks that run, reference pages from code."""
 
+import os
 import posixpath
 import shutil
 import sys
@@ -39,6 +40,8 @@ nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_show_tb = True
 nb_execution_timeout = -1
+# A commit's tests run few (tests/project/test_docs.py).
+nb_execution_excludepatterns = os.environ.get("BIRTHSIM_UNRUN_NOTEBOOKS", "").split()
 nb_merge_streams = True
 # Progress bars, and the word that kernels compile.
 nb_output_stderr = "remove"

@@ -30,10 +30,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Hypothesis also draws literals of all packages that a process happens to have imported: any commit would make other examples.
 HypothesisProvider._local_constants = Constants()
 
-# The same examples every time, and as long as a busy machine needs; make test-slow tries more, make fuzz others, mutants few.
+# The same examples every time, and as long as a busy machine needs; make test-slow tries more, make test-weekly twice as many,
+# make fuzz others, mutants few.
 settings.register_profile("quick", deadline=None, derandomize=True, database=None)
 settings.register_profile("deep", settings.get_profile("quick"), derandomize=False, max_examples=50_000)
-settings.register_profile("slow", settings.get_profile("quick"), max_examples=2000)
+settings.register_profile("slow", settings.get_profile("quick"), max_examples=1000)
+settings.register_profile("weekly", settings.get_profile("quick"), max_examples=2000)
 settings.register_profile("brief", settings.get_profile("quick"), max_examples=5)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 MUTANTS = os.environ.get("HYPOTHESIS_PROFILE") == "brief"
@@ -139,6 +141,8 @@ def pytest_terminal_summary(terminalreporter):
 def pytest_itemcollected(item):
     if item.nodeid.startswith("tests/fuzz/"):
         item.add_marker("fuzz")
+    if item.get_closest_marker("weekly"):
+        item.add_marker("slow")
 
 
 TOGETHER = {

@@ -42,6 +42,7 @@ def test_what_a_checkout_cannot_do_ends_the_measurement():
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_first_steps_compile_once(monkeypatch):
     monkeypatch.setattr(speed, "LAWS", LAWS[:1])
     seconds = dict(speed.first_steps())

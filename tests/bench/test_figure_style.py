@@ -48,7 +48,7 @@ RESULTS = {name: of_result(name) for name in names() if declared(name).draw is n
 
 
 @pytest.mark.parametrize(
-    "draw", [*DRAWINGS.values(), pytest.param(RESULTS["comparison"], marks=pytest.mark.slow)], ids=[*DRAWINGS, "comparison"]
+    "draw", [*DRAWINGS.values(), pytest.param(RESULTS["comparison"], marks=pytest.mark.weekly)], ids=[*DRAWINGS, "comparison"]
 )
 def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, tmp_path):
     for folder in (tmp_path / "one", tmp_path / "other"):

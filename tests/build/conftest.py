@@ -45,9 +45,10 @@ def cortex(tmp_path_factory):
 
 
 @pytest.fixture
-def in_one_code(monkeypatch):
+def in_one_code(monkeypatch, request):
     """Programs have the code of all loops of ``tests.build.loops``, and rows for each, so that it is compiled once for all."""
-    own, functions = Pieces.functions.fget, every_function()
+    seldom = request.node.get_closest_marker("weekly") is not None
+    own, functions = Pieces.functions.fget, every_function(seldom)
     monkeypatch.setattr(Pieces, "functions", property(lambda pieces: sorted({*functions, *own(pieces)})))
     monkeypatch.setattr(machine, "ROOM", 1024)
 

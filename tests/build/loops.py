@@ -41,6 +41,12 @@ BEGUN = {
 """Scenario and arguments of episodes that begin on a device: all that a test there begins, because code for what is missing is
 compiled anew. Not every scenario has every kind of sensors: what it draws does not depend on them."""
 
+OFTEN = (
+    *("circle ideal", "circle lab", "circle honest", "circle encoders-gauges", "forceps honest", "rail-steps lab"),
+    *("noise", "guided", "options", "frictions", "contractions"),
+)
+"""Those that a commit begins: each way to draw, and each kind of sensors and rig; the others weekly."""
+
 SOFT = StiffnessSchedule(closed_loop=(10.0,))
 """So soft that no controller has gains for it."""
 
@@ -58,10 +64,11 @@ def begun(case, lanes):
 
 
 @cache
-def every_function():
-    """Of episodes that begin, of residual policies, and of evaluations."""
-    pieces = [beginning_with(begun(case, 2)) for case in BEGUN]
-    policies = [read_policy(best_policy(scenario)) for scenario in names("policy") if scenario in names("scenario")]
+def every_function(seldom):
+    """Of episodes that begin, of residual policies, and of evaluations; of those too that begin weekly."""
+    pieces = [beginning_with(begun(case, 2)) for case in (BEGUN if seldom else OFTEN)]
+    scenarios = [name for name in names("policy") if name in names("scenario")] if seldom else ["circle"]
+    policies = [read_policy(best_policy(scenario)) for scenario in scenarios]
     residual = [(policy.environment, policy.settings.to_dict()) for policy in policies]
     residual += [("BirthSIM/CircleResidual-v2", given) for given in ({"sensors": "lab"}, {"stiffness": SOFT})]
     for name, given in residual:

@@ -65,7 +65,14 @@ def back_here(made, bars):
 
 
 @pytest.mark.parametrize("lanes", [1, 33, pytest.param(1000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("case", [pytest.param(name, marks=pytest.mark.slow if name != "openings" else ()) for name in CASES])
+@pytest.mark.parametrize(
+    "case",
+    [
+        "openings",
+        pytest.param("a hand that feels", marks=pytest.mark.slow),
+        *(pytest.param(name, marks=pytest.mark.weekly) for name in ("honest sensors", "a law")),
+    ],
+)
 def test_a_thread_goes_back_as_a_lane(case, lanes, device):
     here = made(lanes, **CASES[case])
     simulation, loop, rng = here.simulation, here.recorder.loop, np.random.default_rng(0)
@@ -90,6 +97,7 @@ def test_a_thread_goes_back_as_a_lane(case, lanes, device):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_webassembly_goes_back_with_the_same_bits(tmp_path):
     need_linker()
     need_program("node", "nodejs")
@@ -115,7 +123,9 @@ def test_webassembly_goes_back_with_the_same_bits(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=pytest.mark.weekly if name in ("honest sensors", "a law") else ()) for name in CASES]
+)
 def test_the_way_back_is_exact_and_alone(tmp_path, case):
     need_threads()
     here = made(3, **CASES[case])

@@ -13,7 +13,7 @@ from birthsim_build.device.program import program_of
 from birthsim_env import Circle, ForceProfile
 from birthsim_env.loop.loop import Loop
 from birthsim_env.parts.scenarios import environment_id
-from tests.build.loops import BEGUN, begun
+from tests.build.loops import BEGUN, OFTEN, begun
 from tests.build.targets import assert_fusing_changes_nothing, need_threads
 from tests.build.test_device import assert_equal, assert_same_run
 from tests.build.test_threads import assert_exact
@@ -29,7 +29,7 @@ def made(device, case, lanes, **more):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_one_code")
-@pytest.mark.parametrize("case", BEGUN)
+@pytest.mark.parametrize("case", [pytest.param(name, marks=() if name in OFTEN else pytest.mark.weekly) for name in BEGUN])
 def test_episodes_begin_with_the_bits_of_the_native_environment(case, device):
     envs = [made(where, case, 33, max_episode_steps=3) for where in ("cpu", device)]
     assert_same_run(*envs, 8, staggered=True)
@@ -47,17 +47,20 @@ def test_many_and_one(lanes, device):
 
 
 @pytest.mark.slow
-def test_ptx_of_a_beginning_is_exact_and_alone(tmp_path):
+@pytest.mark.parametrize(
+    "case", ["circle honest", *(pytest.param(name, marks=pytest.mark.weekly) for name in ("noise", "contractions", "options"))]
+)
+def test_ptx_of_a_beginning_is_exact_and_alone(case, tmp_path):
     need_threads()
-    for case in ("noise", "contractions", "options", "circle honest"):
-        many, other = (begun(case, lanes) for lanes in (3, 2))
-        pieces = beginning_with(many)
-        program = program_of(pieces, beginning_with(other), pieces.functions)
-        compile_object(pieces.functions, "ptx", tmp_path / "code.o", threads=program.threads)
-        text = (tmp_path / "code.ptx").read_text()
-        assert_exact(text)
-        assert re.findall(r"^\.visible \.entry birthsim_(\w+)", text, re.MULTILINE) == list(RUNS)
-    assert_fusing_changes_nothing(tmp_path, "begin", 50_000)  # of the last
+    many, other = (begun(case, lanes) for lanes in (3, 2))
+    pieces = beginning_with(many)
+    program = program_of(pieces, beginning_with(other), pieces.functions)
+    compile_object(pieces.functions, "ptx", tmp_path / "code.o", threads=program.threads)
+    text = (tmp_path / "code.ptx").read_text()
+    assert_exact(text)
+    assert re.findall(r"^\.visible \.entry birthsim_(\w+)", text, re.MULTILINE) == list(RUNS)
+    if case == "circle honest":  # of which drawing is most
+        assert_fusing_changes_nothing(tmp_path, "begin", 50_000)
 
 
 class Taps(ForceProfile):

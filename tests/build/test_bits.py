@@ -58,7 +58,7 @@ def rows_of(request):
     return request.getfixturevalue(request.param)
 
 
-@pytest.mark.parametrize("place", ["in_node", "in_c", pytest.param("on_aarch64", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("place", ["in_node", "in_c", pytest.param("on_aarch64", marks=pytest.mark.weekly)])
 @pytest.mark.parametrize(("sensors", "controller"), CASES)
 def test_a_closed_loop(request, place, sensors, controller):
     make = "loop", {"scenario": "circle", "sensors": sensors, "controller": controller}
@@ -119,6 +119,7 @@ def test_a_law_alone_whose_sensors_fail(rows_of, sensors):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("sensors", KINDS)
 def test_a_law_on_cortex_m7(cortex, sensors):
     need_emulator("cortex-m7")
@@ -137,7 +138,10 @@ OPTIONS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.parametrize(
+    "options",  # the page runs a rig with all of them on every commit
+    [pytest.param(options, id=name, marks=pytest.mark.weekly if name == "all" else ()) for name, options in OPTIONS.items()],
+)
 def test_the_plant_with_options(tmp_path, options):
     need_linker()
     if HOST is None:

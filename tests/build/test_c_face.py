@@ -88,6 +88,7 @@ def test_the_header_of_controllers_alone_names_nothing_else(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_the_example_of_a_controller_alone_on_cortex_m7(cortex, tmp_path):
     need_linker()
     system, emulator = EMULATED["cortex-m7"]

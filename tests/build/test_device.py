@@ -22,6 +22,8 @@ from tests.oracles.golden import fingerprints
 
 SEED = 2_100_000
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v2", "BirthSIM/CircleResidual-v2"
+OFTEN = ("circle, ideal, openings", "circle, ideal, residual", "circle, lab, admittance-backstepping")
+"""Rows of fingerprints that a commit runs on a device; where a controller is outside of the program, all have one code."""
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +93,9 @@ def test_lanes_that_wait_begin_where_they_are_told(device):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_one_code")
-@pytest.mark.parametrize("row", fingerprints.rows())
+@pytest.mark.parametrize(
+    "row", [pytest.param(row, marks=() if row in OFTEN else pytest.mark.weekly) for row in fingerprints.rows()]
+)
 def test_the_stored_fingerprints(row, device):
     stored = json.loads(fingerprints.FILE.read_text(encoding="utf-8"))
     assert fingerprints.fingerprint(*fingerprints.rows()[row], device=device) == stored[row]

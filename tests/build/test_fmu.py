@@ -57,12 +57,16 @@ def test_the_plant_computes_the_bits_of_python(written, unit, version):
 
 FELT = ROOT / "examples" / "acceleration_sensor_rig.toml"
 ADAPTIVE = ("admittance-adaptive", "honest")
-SLOW = ((*ADAPTIVE, None, 600), (*ADAPTIVE, FELT, 600), ("backstepping", "ideal", None, 15_990))
+WEEKLY = ((*ADAPTIVE, None, 600), ("backstepping", "ideal", None, 15_990))
 
 
 @pytest.mark.parametrize(
     ("controller", "sensors", "file", "periods"),
-    [("backstepping", "lab", None, 600), *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
+    [
+        ("backstepping", "lab", None, 600),
+        pytest.param(*ADAPTIVE, FELT, 600, marks=pytest.mark.slow),
+        *(pytest.param(*case, marks=pytest.mark.weekly) for case in WEEKLY),
+    ],
 )
 def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, sensors, file, periods):
     """Under the target and the hand of the circle, as seen from Python; the last case is all of Fig. 4."""

@@ -177,21 +177,33 @@ def test_a_thread_computes_the_bits_of_a_lane(loop, lanes):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_hundred_thousand_threads():
-    simulation, pieces, made = both(100_000, sensors="lab")
+    simulation, pieces, made = both(100_000, **CASES["openings"])
     simulation.step(simulation.action)
     assert made.advance(simulation.periods) == 0
     assert differing(pieces, made) == []
     assert len(np.unique(simulation.plant.state[0])) > 99_000
 
 
-@pytest.mark.slow
-def test_ptx_of_all_stages_is_exact_and_alone(tmp_path):
-    """Of all scenarios, sensors, compiled controllers, a policy, and what measures an evaluation."""
+def of_everything():
+    """All scenarios, sensors, compiled controllers, and a policy."""
     pairs = itertools.product(registry.names("scenario"), registry.names("sensors"))
-    made = [begun(2, scenario, sensors=sensors) for scenario, sensors in pairs]
     laws = (*compiled_names(listed=True), "residual:circle")
-    made += [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
+    made = [begun(2, scenario, sensors=sensors) for scenario, sensors in pairs]
+    return made + [begun(2, sensors=sensors, controller=name) for name in laws for sensors in ("ideal", "lab")]
+
+
+def of_cases():
+    """Those above of which most is compiled."""
+    return [begun(2, **CASES[name]) for name in ("flows of one valve", "a policy")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("loops", [of_cases, pytest.param(of_everything, marks=pytest.mark.weekly)])
+def test_ptx_of_stages_is_exact_and_alone(loops, tmp_path):
+    """And of what measures an evaluation."""
+    made = loops()
     functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
     compile_object(sorted(functions | LOOKS), "ptx", tmp_path / "all.o", threads=threads.Threads(1024))
     text = (tmp_path / "all.ptx").read_text()

@@ -14,6 +14,7 @@ from baselines.inputs import COMMAND_OPTIONS
 from baselines.named import LIMITED, known_options, make_controller, resolved, uncontrolled_names
 from birthsim_env import Parameters, Reference
 from birthsim_env.registry import names
+from tests.covering import thinned
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 
@@ -24,9 +25,15 @@ CHOICES = [name for name in names("controller") if name != "admittance"]  # whic
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 LAWS = [*CHOICES, IDENTIFIED, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 NAMES = [*LAWS, *POLICIES]
-# The code of a policy is that of ``residual``: what differs are its weights and the law inside.
-PAIRS = [*itertools.product(LAWS, names("sensors")), *zip(POLICIES, itertools.cycle(names("sensors")), strict=False)]
-CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name, sensors in PAIRS]
+# The code of a policy is that of ``residual``: what differs are its weights and the law inside. A commit takes one on a law,
+# one on the valves, and one that remembers.
+OFTEN = ("circle", "circle_lab_apg", "circle_honest_student")
+SELDOM = [() if name in OFTEN else (pytest.mark.weekly,) for name in names("policy")]
+PAIRS = [
+    *thinned(LAWS, names("sensors")),
+    *zip(POLICIES, itertools.cycle(names("sensors")), SELDOM, strict=False),
+]
+CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=marks) for name, sensors, marks in PAIRS]
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 CONTROLLED = [name for name in NAMES if name not in uncontrolled_names()]
 

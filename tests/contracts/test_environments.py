@@ -21,16 +21,16 @@ from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
 from birthsim_env.reward import REWARD_TERMS
+from tests.covering import thinned
 from tests.physics.plant.test_options import EACH, WORTH
 
 CIRCLE, RESIDUAL, FORCEPS = "BirthSIM/Circle-v2", "BirthSIM/CircleResidual-v2", "BirthSIM/Forceps-v2"
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
+SCENES, INSIDE = thinned(names("scenario"), names("sensors")), thinned(LAWS, names("sensors"))
 WORLDS = {
-    **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True})
-       for name, sensors in itertools.product(names("scenario"), names("sensors"))},
+    **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True}) for name, sensors, _ in SCENES},
     **{f"hand {hand}": (CIRCLE, {"user_force": hand, "randomize": True}) for hand in names("hand")},
-    **{f"law {law} {sensors}": (RESIDUAL, {"law": law, "sensors": sensors, "randomize": True})
-       for law, sensors in itertools.product(LAWS, names("sensors"))},
+    **{f"law {law} {sensors}": (RESIDUAL, {"law": law, "sensors": sensors, "randomize": True}) for law, sensors, _ in INSIDE},
     **{f"impedance {mode}": ("BirthSIM/DystociaResidual-v2", {"impedance": mode}) for mode in IMPEDANCES},
     **{f"option {name}": (CIRCLE, {"parameters": Parameters().replace(changes)}) for name, changes in EACH.items()},
     "flows": (FORCEPS, {"action_mode": "flow", "valves": "one_valve"}),
@@ -40,7 +40,9 @@ WORLDS = {
     "drawn options": (CIRCLE, {"randomize": {name: pair for name, pair in WORTH.items() if "electronics" not in name}}),
     **{f"acceleration {sensors}": (CIRCLE, {"sensors": sensors, "parameters": FELT}) for sensors in ("lab", "honest")},
 }  # fmt: skip
-every_world = pytest.mark.parametrize("world", WORLDS)
+SELDOM = {f"{name} {sensors}": marks for name, sensors, marks in SCENES}
+SELDOM |= {f"law {law} {sensors}": marks for law, sensors, marks in INSIDE}
+every_world = pytest.mark.parametrize("world", [pytest.param(world, marks=SELDOM.get(world, ())) for world in WORLDS])
 
 
 def made(world, lanes, **more):
@@ -72,12 +74,13 @@ def assert_lane(infos, lane, info, where=""):
 
 
 IDS = environment_ids()
-FACES = [
-    dict(zip(("action_mode", "valves", "sensors"), face, strict=True))
-    for face in itertools.product(("valve", "flow"), ("two_valves", "one_valve"), names("sensors"))
-]
-CHECKED = [(CIRCLE, face) for face in FACES] + [
-    (name, {"sensors": sensors, "randomize": True}) for name in IDS for sensors in names("sensors")
+FACES = thinned([*itertools.product(("valve", "flow"), ("two_valves", "one_valve"))], names("sensors"))
+CHECKED = [
+    pytest.param(CIRCLE, {"action_mode": mode, "valves": valves, "sensors": sensors}, marks=marks)
+    for (mode, valves), sensors, marks in FACES
+] + [
+    pytest.param(name, {"sensors": sensors, "randomize": True}, marks=marks)
+    for name, sensors, marks in thinned(IDS, names("sensors"))
 ]
 
 

@@ -60,7 +60,7 @@ def registered():
 
 
 @pytest.mark.usefixtures("registered")
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.weekly if name == "identify" else ()) for name in NAMES])
 def test_an_example_runs(name, tmp_path, monkeypatch):
     if name == "export":
         need_linker()

@@ -113,7 +113,7 @@ def attempt(command, path, out):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(900, 908))
+@pytest.mark.parametrize("seed", [*range(900, 903), *(pytest.param(k, marks=pytest.mark.weekly) for k in range(903, 908))])
 def test_an_odd_rig_works_or_is_refused_in_a_line(seed, tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(tomli_w.dumps(odd_rig(seed)), encoding="utf-8")

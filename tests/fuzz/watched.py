@@ -39,7 +39,7 @@ CODE = (str(ROOT), sys.prefix, sys.base_prefix, "<frozen", "<string>", "<__array
 """Where code that may run comes from; of the package itself what ``gradients.tracing`` makes, once a process."""
 
 cases = settings(max_examples=settings.default.max_examples // 10, suppress_health_check=list(HealthCheck))
-"""Examples of one kind: 10 in the profile ``quick``, 200 in ``slow``, 5,000 in ``deep``."""
+"""Examples of one kind: 10 in the profile ``quick``, 100 in ``slow``, 200 in ``weekly``, 5,000 in ``deep``."""
 
 
 prebuilt._opened()  # once a process, whichever example would be the first

@@ -43,9 +43,26 @@ LAW_LOOPS = {
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
 FAST = ("a hand that feels",)
+OFTEN = {
+    "backstepping-cartesian",
+    "backstepping-integral",
+    "abry",
+    "admittance-sensorless",
+    "sliding-mode",
+    "adrc",
+    "time-delay",
+}
+"""Laws of which a commit compiles derivatives, beside those of the scenarios' loops; the others weekly."""
+WEEKLY = {"informed", *(name for name in LAW_LOOPS if name.partition(",")[0] not in {*OFTEN, "limited:pid"})}
 
 
-@pytest.mark.parametrize("name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in LOOPS])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.weekly if name in WEEKLY else () if name in FAST else pytest.mark.slow)
+        for name in LOOPS
+    ],
+)
 def test_gradients_are_differences(name: str) -> None:
     """To actions and state over four policy steps, randomised rigs: median 1e-7; what is farther off stands on kinks."""
     off, equal = compared(begun(lanes=40, **LOOPS[name]))

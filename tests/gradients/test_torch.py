@@ -67,6 +67,7 @@ def test_the_last_step_of_an_episode_has_the_gradients_of_any_other() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_the_example_learns_in_two_hundred_updates() -> None:
     """Shut valves, at which it begins, leave 3 to 5 mm once hands push."""
     errors = run_path(f"{ROOT}/examples/gradients.py")["train"](200)
@@ -74,7 +75,7 @@ def test_the_example_learns_in_two_hundred_updates() -> None:
     assert np.median(errors[20:60]) > 3.0
 
 
-@pytest.mark.parametrize("sensors", ["ideal", pytest.param("honest", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sensors", ["ideal", pytest.param("honest", marks=pytest.mark.weekly)])
 def test_gradients_of_lanes_on_a_device_have_the_bits_of_those_here(sensors: str, device: str) -> None:
     """Over the ends of episodes, where other rigs begin."""
     found = []

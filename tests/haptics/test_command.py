@@ -121,6 +121,7 @@ def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost():
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(rendering, "STIFFNESSES", (2000.0,))
     monkeypatch.setattr(backdriving, "STIFFNESSES", (500.0, 0.0))

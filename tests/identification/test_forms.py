@@ -151,6 +151,7 @@ def test_logs_of_encoders_and_of_both_come_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_friction_by_pressure_and_direction_is_found_from_five_seconds() -> None:
     true = {"cylinder1.pressure_friction": 9e-6, "cylinder2.pressure_friction": 2.5e-6, "cylinder1.direction_asymmetry": 0.12}
     rig = TRUE.replace(true)

@@ -19,8 +19,7 @@ from birthsim.commands.identify import Settings
 from birthsim_env.physics.rig.parameters import Parameters, value_of
 from lab.studies.strangers.model import Strangeness
 from lab.studies.strangers.tasks import strange
-from tests.identification.test_estimate import noisier
-from tests.identification.trials import OWNER, TRUE, part, trial
+from tests.identification.trials import OWNER, TRUE
 
 WINDOWS, ROWS, STARTS, COUNT = 12, 30, 4, 3
 
@@ -97,7 +96,9 @@ def found_of(law: str, friction_law: str | None = None) -> Identified:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["lugre", "coulomb", "elasto_plastic"])
+@pytest.mark.parametrize(
+    "law", ["elasto_plastic", *(pytest.param(name, marks=pytest.mark.weekly) for name in ("lugre", "coulomb"))]
+)
 def test_the_law_of_the_rig_is_chosen_and_its_friction_found(law: str) -> None:
     found = found_of(law)
     assert found.rig.friction.law == found.laws.chosen == law
@@ -108,20 +109,12 @@ def test_the_law_of_the_rig_is_chosen_and_its_friction_found(law: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_law_that_is_asked_for_is_fitted_alone_and_may_not_fit() -> None:
     found = found_of("elasto_plastic", "lugre")
     assert found.rig.friction.law == "lugre"
     assert not found.laws.chances
     assert [line for line in found.words() if "more than noise" in line and "another law of friction, friction along" in line]
-
-
-@pytest.mark.slow
-def test_where_noise_hides_friction_the_owners_law_is_kept() -> None:
-    """Under noise eighty times that of a laboratory."""
-    found = identify(noisier(part(trial(), 500, 3000), 4e4, 1e-2), OWNER, 0)
-    assert found.laws.chosen == "lugre"
-    assert found.laws.rivals
-    assert [line for line in found.words() if line.startswith("friction.law = lugre, KEPT: the log cannot tell ")]
 
 
 @pytest.mark.slow
@@ -135,6 +128,7 @@ def test_friction_that_no_law_has_is_warned_of() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_maxwell_slip_is_warned_of() -> None:
     (line,) = [line for line in found_of("gms").words() if "more than noise" in line]
     assert "--friction-law gms" in line

@@ -27,6 +27,8 @@ ENDINGS = {
 }  # fmt: skip
 """Signal, whether the whole group gets it as from a terminal, and how often."""
 SCENARIOS = (*ENDINGS, "disk full", "two at once")
+EACH = ("evaluate", "onnx", "fmu", "tune", "parquet", "mcap")
+"""Commands that a commit disturbs, so that each scenario and each kind of result is met; the others weekly."""
 BETWEEN = 0.3
 """s at most between the two of Ctrl-C twice."""
 MOST = 3
@@ -218,7 +220,7 @@ def attempt(course, scenario, rng, place):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in EACH else pytest.mark.weekly) for name in TARGETS])
 def test_a_command_that_is_disturbed_ends_as_one_that_was_not(name, small, tmp_path):
     if missing := [module for module in TARGETS[name].needs if find_spec(module) is None]:
         pytest.skip(f"{' and '.join(missing)} is not installed")

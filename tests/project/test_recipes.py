@@ -124,7 +124,9 @@ def test_a_recipe_touches_and_reads_what_is_told(recipe):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("recipe", ADDED)
+@pytest.mark.parametrize(
+    "recipe", [pytest.param(name, marks=pytest.mark.weekly if name in ("scenario", "parameter") else ()) for name in ADDED]
+)
 def test_a_recipe_is_all_that_it_takes(recipe, performed):
     added, place = ADDED[recipe], performed(recipe)
     own = [name for name in files_of(recipe) if Path(name).name.startswith("test_")]
@@ -142,6 +144,7 @@ def test_a_recipe_is_all_that_it_takes(recipe, performed):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_controller_that_is_registered_makes_no_result_stale(tree, performed):
     line = ("-m", "birthsim", "study", "status")
     (status, said), (plain, before) = (run_in(place, *line) for place in (performed("controller"), tree))

@@ -14,11 +14,13 @@ from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.registry import names
+from tests.covering import thinned
 from tests.oracles.residual_parts import UnexplainedForceObserver
 
 IDS = tuple(environment_id(name, "Residual") for name in names("scenario"))
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v2", "BirthSIM/ProbeResidual-v3"
 RIG = Parameters()
+SENSED = thinned(LAWS[:-1], names("sensors"))
 
 
 def single(name=CIRCLE, **arguments):
@@ -63,8 +65,7 @@ def assert_follows(env, actions, rows, seed):
             np.testing.assert_array_equal(info[field], expected[field], err_msg=field)
 
 
-@pytest.mark.parametrize("law", LAWS[:-1])
-@pytest.mark.parametrize("sensors", names("sensors"))
+@pytest.mark.parametrize(("law", "sensors"), [pytest.param(*pair, marks=seldom) for *pair, seldom in SENSED])
 def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)

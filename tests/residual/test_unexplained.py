@@ -87,7 +87,7 @@ def unexplained(truth: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize(
-    ("sensors", "fraction", "close"), [pytest.param("ideal", 0.9, 1.0, marks=pytest.mark.slow), ("lab", 0.5, 5.0)]
+    ("sensors", "fraction", "close"), [pytest.param("ideal", 0.9, 1.0, marks=pytest.mark.weekly), ("lab", 0.5, 5.0)]
 )
 def test_friction_opposes_both_ways_and_weight_neither(sensors: str, fraction: float, close: float) -> None:
     """Out: too much weight, less friction; in: the same and friction. Within 1 N of 57 N, but for the instants after a turn."""

@@ -64,7 +64,7 @@ LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v2")
         pytest.param(replace(TINY, algorithm="tqc", steps=256), RESIDUAL, [(*STEP, 30)], marks=SLOW, id="tqc"),
         pytest.param(RECURRENT, RESIDUAL, [(*STEP, 70), (*CHECK, 5)], id="recurrent ppo, two deaths"),
         pytest.param(SHORT, PURE, [UPDATE], marks=SLOW, id="apg"),
-        pytest.param(BESIDE, INFORMED, [UPDATE], marks=SLOW, id="apg, informed"),
+        pytest.param(BESIDE, INFORMED, [UPDATE], marks=pytest.mark.weekly, id="apg, informed"),
     ],
 )
 @pytest.mark.usefixtures("short_probe")
@@ -114,6 +114,7 @@ validations = 8
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_process_that_is_killed_ends_with_the_same_policy(tmp_path):
     """SIGKILL, which no handler sees, at any moment after some checkpoint; then the same command again."""
     (tmp_path / "tiny.toml").write_text(CONFIGURATION)

@@ -62,7 +62,13 @@ def test_the_crossed_interval_knows_that_seeds_are_a_sample_too():
     np.testing.assert_allclose([low, high], one.mean() + np.array([-1, 1]) * 1.96 * one.std() / 20, atol=0.02)
 
 
-@pytest.mark.slow
+@pytest.fixture
+def coarse(monkeypatch):
+    """Intervals by so few draws that they take no time, where a test says nothing of them."""
+    monkeypatch.setattr(crossed_interval, "__defaults__", (40,))
+
+
+@pytest.mark.usefixtures("coarse")
 def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     law = evaluation("law", [2.0, 2.0, 2.0, 50.0], beyond=(3,))
     residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], beyond=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
@@ -76,6 +82,7 @@ def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     assert merged(residuals, "both").lost == [False] * 6 + [True, False]
 
 
+@pytest.mark.usefixtures("coarse")
 def test_where_most_episodes_are_lost_the_table_says_so():
     law = evaluation("law", [1.0, 2.0, 3.0, 4.0])
     text = as_table(seed_metrics(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2))
@@ -188,6 +195,7 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkey
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse")
 def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_path, monkeypatch, capsys):
     asked, result = [], evaluate_piece("pid", "", Parameters().to_dict(), "BirthSIM/Probe-v3", {"duration": 4.5}, [], 0, 4)
 

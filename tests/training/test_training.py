@@ -75,15 +75,14 @@ def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize(
     "changes",
     [
         # Seed 0 reached 0.68 of the law's error; a batch is 8 sequences.
         {"algorithm": "recurrent-ppo", "hidden": (32,), "memory": 16},
         # 0.79, after 3,000 updates, which take minutes.
-        pytest.param(
-            {"algorithm": "sac", "steps": 24_000, "lanes": 32, "gradient_steps": 4, "validations": 4}, marks=pytest.mark.weekly
-        ),
+        {"algorithm": "sac", "steps": 24_000, "lanes": 32, "gradient_steps": 4, "validations": 4},
     ],
 )
 def test_the_other_algorithms_get_better_than_the_law(tmp_path, monkeypatch, changes):
@@ -200,6 +199,7 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_the_default_training_improves_on_the_law_on_the_circle(tmp_path):
     """A part of the default budget."""
     reached = train(TrainingSettings(steps=200_000, validations=2), ResidualSettings(), tmp_path)

@@ -122,7 +122,7 @@ def test_every_scenario_with_every_sensor(page):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("sensors", [pytest.param("ideal", marks=pytest.mark.weekly), "lab"])
 def test_every_controller(page, sensors):
     assert set(OFFERED) >= FEW
     check(page, *((on_the_circle(name, sensors), None) for name in OFFERED))

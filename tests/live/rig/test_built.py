@@ -22,6 +22,7 @@ RENEW = "python -m birthsim_live.rig.build renews it"
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 def test_a_fresh_build_is_equal(tmp_path, monkeypatch):
     """Of what it lists: what is registered since then waits for the next build, and the page says so."""
     need_linker()
