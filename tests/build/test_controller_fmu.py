@@ -21,6 +21,7 @@ from tests.console import ROOT
 
 validate_fmu = imported("fmpy.validation").validate_fmu
 
+FINDING = "admittance-adaptive[finds_rig=true]"
 BACKSTEPPING = ("--controller", "backstepping")
 ADAPTIVE = ("--controller", "admittance-adaptive", "--fmi", 3)
 POSITIONS, VELOCITIES = ["measured_x", "measured_y"], ["measured_vx", "measured_vy"]
@@ -73,6 +74,7 @@ def commanded(law, rows, sampled, rig=None):
         ("ideal", "backstepping", BACKSTEPPING),
         ("ideal", "admittance-adaptive", ADAPTIVE),
         ("lab", "residual:circle", ("--policy", "circle", "--sensors", "lab")),
+        ("lab", FINDING, ("--controller", FINDING, "--sensors", "lab")),
     ],
 )
 def test_the_openings_are_those_of_python(written, unit, sensors, law, options):

@@ -9,7 +9,7 @@ from baselines.bench.evaluation import Evaluation, batches, evaluate, merged
 from baselines.named import make_controller
 from baselines.staged import StagedController
 from birthsim_env.assembly import Arguments
-from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.randomization import Ranges, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.rig.parameters import Parameters
 from lab.studies.sensorless.privileged import Privileged
@@ -26,13 +26,17 @@ def can_be_privileged(controller: str, rig: Parameters) -> bool:
     return type(made).policy_stages is StagedController.policy_stages
 
 
+def drawn_rigs(rig: Parameters, ranges: Ranges, seeds: Sequence[int]) -> list[Parameters]:
+    """The rigs that worlds of ``seeds`` draw from ``ranges`` about ``rig``."""
+    return [draw_parameters(rig, ranges, stream(seed, 0, "parameters")) for seed in seeds]
+
+
 def privileged_controller(controller: str, rig: Parameters, seeds: Sequence[int]) -> Privileged:
     """``controller`` in as many lanes as ``seeds``, each told the plant that its world draws about ``rig``.
 
     Of the sensors it believes what ``rig`` says.
     """
-    ranges = documented_ranges(rig)
-    drawn = [draw_parameters(rig, ranges, stream(seed, 0, "parameters")) for seed in seeds]
+    drawn = drawn_rigs(rig, documented_ranges(rig), seeds)
     return Privileged([cast(StagedController, make_controller(controller, one)) for one in drawn])
 
 
