@@ -34,11 +34,11 @@ def fresh(rig: Array) -> Array:
 
 
 @helper
-def believe(belief: Belief, i: int, memory: Memory, constants: Constants, own: Constants) -> None:
+def believe(belief: Belief, i: int, memory: Memory, constants: Constants, own: Constants, eager: float) -> float:
     """Carries the belief of lane ``i`` on by one period, and writes to ``own`` what of the ``constants`` follows from it.
 
-    ``memory`` is that of the law."""
-    left = exact.exp(-constants.model.period / TIME)
+    ``memory`` is that of the law; with ``eager`` below 1 it goes over more slowly. Returns what is left of the way."""
+    left = 1.0 - eager * (1.0 - exact.exp(-constants.model.period / TIME))
     for k in range(Constants.size):
         own.rows[k] = constants.rows[k]
     for k in range(Rig.size):
@@ -51,3 +51,4 @@ def believe(belief: Belief, i: int, memory: Memory, constants: Constants, own: C
     belief.news[i] *= left
     if constants.learns_mass == 0.0:
         memory.inertia.mass[i] = own.model.rig.mass
+    return left

@@ -1,28 +1,28 @@
 """What the law gives the filter that finds its rig (``rig_filter``), and what it is told by it: one call a control period."""
 
-from baselines.admittance.belief import TIME, Belief
+from baselines.admittance.belief import Belief
 from baselines.admittance.rows import Constants, Memory
 from baselines.estimation import dry_friction, rig_filter
 from baselines.estimation.rig_filter import BALANCE, RigFilter
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.stack import column
 from birthsim_env.physics.linkage import geometry, mechanics
 
 
 @helper
-def find(finder: RigFilter, belief: Belief, i: int, seen: Seen, memory: Memory, constants: Constants, own: Constants) -> None:
+def find(
+    finder: RigFilter, belief: Belief, i: int, seen: Seen, memory: Memory, constants: Constants, own: Constants, left: float
+) -> None:
     """Carries the filter of lane ``i`` on by one period, and tells the lane what it has found.
 
-    ``own`` are the ``constants`` with the rig that the lane believes in now."""
+    ``own`` are the ``constants`` with the rig that the lane believes in now, ``left`` is what ``believe`` returns."""
     described, p, period = constants.model.rig, own.model.rig, constants.model.period
     joints, chambers, pistons = memory.joints, memory.chambers, memory.pistons
     if memory.fresh[i] > 0.0:
         for chamber in range(4):
             finder.pressure[chamber, i], finder.spool[chamber, i] = seen.pressure[chamber, i], 0.0
         return
-    left = exact.exp(-period / TIME)
     for a in range(rig_filter.SIZE):
         finder.believed[a, i] = finder.told[a, i] + left * (finder.believed[a, i] - finder.told[a, i])
     for chamber in range(4):
@@ -38,6 +38,7 @@ def find(finder: RigFilter, belief: Belief, i: int, seen: Seen, memory: Memory, 
             p,
         )
     finder.since[i] += period
+    finder.age[i] += period
     due, signals = finder.since[i] >= rig_filter.EVERY, column(BALANCE)
     _, _, _, _, _, kappa, sine, cosine = geometry.pose(
         joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3

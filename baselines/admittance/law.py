@@ -24,7 +24,7 @@ from baselines.admittance.finding import find
 from baselines.admittance.rows import Constants, Estimate, Follower, Gains, Memory, OscillationDetector
 from baselines.backstepping.cartesian_law import across, along, load_rates
 from baselines.estimation.hand.half_wave import sustained
-from baselines.estimation.rig_filter import RigFilter
+from baselines.estimation.rig_filter import EAGER, RigFilter
 from baselines.estimation.rows import AssumedParameters
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
@@ -200,9 +200,12 @@ def control_each(world: int, seen: Seen, memory: int, constants: Constants, tabl
     for i in range(n):
         signals, estimate = Seen(seen.rows[:, i : i + 1]), Estimate(scratch(Estimate.size)[:, :1])
         own = Constants(column(Constants.size))
-        believe(beliefs, i, remembered, constants, own)
         if found > 0:
             finder = RigFilter(block(memory, believing + found)[believing:])
-            find(finder, beliefs, i, seen, remembered, constants, own)
+            eager = 1.0 if finder.age[i] < EAGER else remembered.follower.moved[i]
+            left = believe(beliefs, i, remembered, constants, own, eager)
+            find(finder, beliefs, i, seen, remembered, constants, own, left)
+        else:
+            believe(beliefs, i, remembered, constants, own, 1.0)
         missed += advance(signals, whole[:, i : i + 1], estimate, own)
     return missed

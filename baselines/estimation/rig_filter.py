@@ -58,6 +58,10 @@ BALANCE, HAND, SPECIFIC, SPEED, SLIDING, DIFFERENCE = 5, 0, 1, 2, 3, 4
 EVERY, SETTLING = 0.01, 0.15
 """s between two balances of forces, and until the first one, when the observer of pistons has settled; assumed."""
 
+EAGER = 1.0
+"""s; found by trial: so long a lane believes at once what is found, by which it holds a head that it would let fall. From then
+on it does so while its motion moves, since at rest a model that changes stirs the head."""
+
 MARGIN = 3e-3
 """m; assumed: nearer to an end stop than that, its force may be among those of a balance."""
 
@@ -82,6 +86,9 @@ FORCE_ERROR, PULL_ERROR, SLIP_ERROR, LEVEL_ERROR, BALANCES = 3.0, 0.5, 0.7, 0.15
 """Found by trial: standard deviations of forces, N, and of the specific force, m/s2, in a balance; of friction, in units of its
 level, of the part that has no direction and of all; and in how many balances the errors are new ones."""
 
+CERTAIN = 0.06
+"""1; found by trial: a logarithm with this standard deviation is told in full, one with twice as much not at all."""
+
 REACH = 2.0
 """Standard deviations of what rigs are; assumed: no rig is further from the one described."""
 
@@ -97,7 +104,7 @@ class RigFilter(Rows):
     """What is known of the rig."""
 
     mean = rows(SIZE, "1", "logarithm of a parameter over that described")
-    told = rows(SIZE, "1", "the mean when the law was told last")
+    told = rows(SIZE, "1", "what the law was told last")
     believed = rows(SIZE, "1", "what the law believes, which goes over to what it is told")
     covariance = rows(SIZE * SIZE, "1", "of the logarithms, row by row")
     sensitivity = rows(4 * OF_CHAMBER, "Pa", "of expected pressures, chamber by chamber, to the parameters they depend on")
@@ -108,6 +115,7 @@ class RigFilter(Rows):
     second = rows(2 * BALANCE, "SI", "low-passed twice")
     third = rows(2 * BALANCE, "SI", "low-passed three times")
     since = row("s", "since the last balance")
+    age = row("s", "since the start")
     fresh = row("1", "1 at a new start")
 
 
@@ -253,14 +261,18 @@ def write_rig(described: Rig, logarithms: Array, p: Rig) -> None:
 
 @helper
 def tell(filter_: RigFilter, i: int, described: Rig, spread: Array, told: Array) -> None:
-    """Writes the rig that lane ``i`` is told, rows (PARAMETERS, N); ``spread`` (SIZE,) is that of rigs."""
+    """Writes the rig that lane ``i`` is told, rows (PARAMETERS, N), as far as it is certain.
+
+    ``spread`` (SIZE,) is that of rigs."""
     p, logarithms = Rig(column(Rig.size)), column(SIZE)
     for a in range(SIZE):
-        most = REACH * spread[a]
+        share = 1.0
         if a != INDEX:
+            most, unsure = REACH * spread[a], math.sqrt(max(0.0, filter_.covariance[(SIZE + 1) * a, i]))
             filter_.mean[a, i] = max(-most, min(most, filter_.mean[a, i]))
-        filter_.told[a, i] = filter_.mean[a, i]
-        logarithms[a] = filter_.mean[a, i]
+            share = max(0.0, min(1.0, 2.0 - unsure / CERTAIN))
+        filter_.told[a, i] = share * filter_.mean[a, i]
+        logarithms[a] = filter_.told[a, i]
     write_rig(described, logarithms, p)
     for k in range(Rig.size):
         told[k, i] = p.rows[k]
