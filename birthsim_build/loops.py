@@ -15,7 +15,8 @@ from birthsim_env.loop import pipeline
 from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, PRESSURE, SEEN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import guide_stage, plant_stage
-from birthsim_env.physics.compiled.lanes import PARAMETERS, PRESSURES, STATES, Array
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.idle import idle_pressures
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -99,9 +100,9 @@ def alone_rows(rig: Parameters) -> Array:
 
     Laws read those all the same: they show what is in the idle cylinder, whose valves are shut.
     """
-    rows, state = np.zeros(WORLD + SEEN), Plant(rig).state[:, 0]
-    for chamber in {*range(len(PRESSURES))} - {*rig.linkage.topology.chambers}:
-        rows[WORLD + PRESSURE + chamber] = state[PRESSURES[chamber]]
+    rows = np.zeros(WORLD + SEEN)
+    for chamber, pressure in idle_pressures(rig).items():
+        rows[WORLD + PRESSURE + chamber] = pressure
     return rows
 
 

@@ -10,6 +10,7 @@ valves closed or venting. After a normal course the valves close. ``hold`` keeps
 import math
 import os
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from birthsim_env.loop.guard import PNEUMATIC, STIFFNESS
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.idle import idle_pressures
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import problem
 
@@ -50,12 +52,18 @@ def nothing_measured() -> Measurement:
     return Measurement(none, pair, none, pair, np.full((4, 1), np.nan), pair, True, pair)
 
 
-def in_a_lane(seen: Measurement) -> Measurement:
-    """A sample of one rig as one over one lane, which controllers take without a detour."""
-    acceleration = None if seen.acceleration is None else seen.acceleration[:, None]
+def in_a_lane(seen: Measurement, idle: Mapping[int, float]) -> Measurement:
+    """A sample of one rig as one over one lane, which controllers take without a detour.
+
+    ``idle`` has pressures, Pa, of chambers that the rig lacks: whatever its driver says of them, no law shall wait for it."""
+    acceleration, pressures = None if seen.acceleration is None else seen.acceleration[:, None], seen.pressures[:, None]
+    if idle:
+        pressures = pressures.copy()
+        for chamber, pressure in idle.items():
+            pressures[chamber] = pressure
     return Measurement(
         np.reshape(seen.time, 1), seen.position[:, None], np.reshape(seen.position_time, 1), seen.velocity[:, None],
-        seen.pressures[:, None], seen.user_force[:, None], seen.sampled, acceleration,
+        pressures, seen.user_force[:, None], seen.sampled, acceleration,
     )  # fmt: skip
 
 
@@ -86,6 +94,7 @@ class Loop:
 
     def __post_init__(self) -> None:
         self._supervisor = Supervisor(self.limits, self.rig, self.needs)
+        self._idle = idle_pressures(self.rig)
         self._period = self.rig.electronics.control_period
         self._phase, self._count, self._since = WAIT, 0, 0.0
         self._started, self._now, self._begun = time.perf_counter(), 0.0, 0.0
@@ -143,7 +152,7 @@ class Loop:
             target = self._reference[:2, 0].tolist() if self._phase in (COURSE, HOLDS) else None
             looked = self._supervisor.look(seen, arrived, target)
             found = found or looked or self._shut()
-            self._measured = in_a_lane(seen)
+            self._measured = in_a_lane(seen, self._idle)
         else:
             self._now += self._period if self._phase > WAIT else 0.0
             self._measured = self._nothing

@@ -53,3 +53,32 @@ def test_a_driven_rig_moves_as_in_pythons_own_loop(tmp_path, controller, environ
         if not simulation.sensors.has_board:  # which rounds what it puts out
             assert rows[Period.opening.place][:, k].tolist() == simulation.openings[:, 0].tolist(), k
     env.close()
+
+
+class WithoutCylinder1:
+    """A driver of a rail that has nothing to say of the cylinder that is not there."""
+
+    def __init__(self, driver):
+        self._driver = driver
+
+    def __getattr__(self, name):
+        return getattr(self._driver, name)
+
+    def read(self):
+        seen = self._driver.read()
+        seen.pressures[:2] = np.nan
+        return seen
+
+
+def test_a_rails_driver_may_say_nothing_of_the_cylinder_that_it_lacks(tmp_path):
+    def openings(name, **options):
+        (tmp_path / name).mkdir()
+        simulated = Simulated("BirthSIM/Rail-v0", RAIL, "encoders", seed=3, lockstep=True)
+        told = {"rig": RAIL, "controller": "admittance", "environment": "BirthSIM/Rail-v0", "seed": 3, "duration": 0.2}
+        loop, record, _ = drive(tmp_path / name, simulated, **told, **options)
+        assert loop.faults == []
+        return record.kept[Period.opening.place]
+
+    whole, lacking = openings("whole"), openings("lacking", wrap=WithoutCylinder1)
+    assert np.ptp(whole[2:], axis=1).min() > 0.01
+    np.testing.assert_array_equal(whole, lacking)
