@@ -33,7 +33,7 @@ def remembered(lanes: int) -> Memory:
 
 REST = {
     "pneumatic_gain": 30.0, "gain": 60.0, "rest_gain": 60.0, "rest_push": 1.0, "dead_zone": 0.0, "oscillation": 0.06,
-    "swing": 0.0, "yielding": 0.9, "least_fraction": LEAST_FRACTION, "most_falls": 1.0,
+    "heavy": 1e9, "swing": 0.0, "yielding": 0.9, "least_fraction": LEAST_FRACTION, "most_falls": 1.0,
 }  # fmt: skip
 """Gains of a law of which nothing is under test."""
 
@@ -154,6 +154,18 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
     c = 30.0 + 30.0 * decay
     np.testing.assert_allclose(stiffnesses[:399], c**3 + 2 * c, rtol=1e-4)
     assert stiffnesses[399] == pytest.approx(60.0**3 + 120.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(("mass", "rest_gain"), [(1.0, 36.0), (5.0, 36.0), (7.2, 30.0), (9.8, 36.0 / 1.4)])
+def test_a_heavy_head_rests_with_a_gain_that_is_less_by_the_root_of_its_mass(mass: float, rest_gain: float) -> None:
+    rig, error = RIG.replace({**LINEAR.changes(), "mechanics.mass": mass}), 5e-5
+    now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
+    nothing = np.zeros((2, 1))
+    motion, _ = near(now, rig, nothing, seed=1, fraction=0.0)
+    motion[0] -= error
+    openings = commanded(rig, now, motion, moving=0.0, rest_gain=36.0, heavy=5.0)
+    jerk = rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1][0, 0]
+    assert -jerk / error == pytest.approx(rest_gain**3 + 2 * rest_gain, rel=1e-4)
 
 
 @pytest.mark.parametrize("lead_time", [0.0015, 0.01])
