@@ -367,7 +367,7 @@ class AdmittanceController(StagedController):
             gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}),
             rows_of_finder=RigFilter.size if self._finds_rig else 0,
             cell_noise=board.pressure_noise,
-            spread=rig_filter.spread_of(rig),
+            spread=rig_filter.spread_of(rig) if self._finds_rig else np.zeros(rig_filter.SIZE),
         )
         own = ControllerStage(function, constants, remembered)
         return [inertial.controller_stage(rig), own] if inert else [own]
