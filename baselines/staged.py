@@ -186,6 +186,10 @@ class StagedController:
             self._kept = np.repeat(guard.fresh(self.parameters)[:, None], lanes, axis=1)
             self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
             self._openings: Array = np.zeros((4, lanes))
+            self.begin(np.ones(lanes, dtype=np.bool_))
+
+    def begin(self, lanes: Mask) -> None:
+        """What a derived class does where ``lanes`` (N,) begin anew, once their memories are fresh."""
 
     def policy_stages(self) -> list[Part]:
         """What runs before the law, once prepared: a policy where it has one."""
@@ -226,6 +230,7 @@ class StagedController:
                 memory[:, lanes] = one.fresh[:, None]
             self._kept[:, lanes] = guard.fresh(self.parameters)[:, None]
             self._openings[:, lanes] = 0.0
+            self.begin(lanes)
 
     def command(
         self,

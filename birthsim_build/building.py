@@ -1,6 +1,5 @@
 """Builds a bundle for a target into a folder."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from birthsim_build.estimate import estimates
 from birthsim_build.faces.c import write_examples, write_header, write_kernels
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
+from birthsim_env.files import temporary_folder
 from birthsim_env.physics.rig.parameters import Parameters
 
 STACK = 65536
@@ -29,8 +29,8 @@ Loop = tuple[str, str, str]
 
 def write_wasm(functions: list[str], out: Path, threads: Threads | None = None) -> None:
     """Write the code of stages and of what runs an image of them, or ``threads`` a program."""
-    with tempfile.TemporaryDirectory() as place:
-        built = Path(place) / "birthsim.o"
+    with temporary_folder() as place:
+        built = place / "birthsim.o"
         compile_object(functions, "wasm", built, threads=threads)
         runs = threads.runs if threads else ("advance",)
         exported = ("--export=__heap_base", *(f"--export=birthsim_{name}" for name in runs))

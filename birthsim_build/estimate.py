@@ -4,8 +4,6 @@ The law runs on this machine, on what sensors said in a closed loop, as code tha
 """
 
 import ctypes
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +14,7 @@ from birthsim_build.code.counting import COUNTS, OPERATIONS
 from birthsim_build.code.targets import HOST
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import ROWS
+from birthsim_env.files import temporary_folder
 from birthsim_env.loop.rows import ASKED, WORLD
 from birthsim_env.parts.scenarios import scenarios_for
 from birthsim_env.physics.compiled.lanes import Array
@@ -42,8 +41,8 @@ def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:
     whole = make_bundle(bundle.rig, [scenario], kinds.values(), ())
     whole = Bundle(bundle.rig, whole.worlds, bundle.laws, None)
     images = whole.images()
-    with tempfile.TemporaryDirectory() as folder:
-        built, library = Path(folder) / "counting.o", Path(folder) / "counting.so"
+    with temporary_folder() as folder:
+        built, library = folder / "counting.o", folder / "counting.so"
         compile_object(whole.functions, HOST, built, count=True)
         link("ld.lld", "-m", EMULATIONS[HOST], "-shared", "-o", str(library), str(built))
         code: Any = ctypes.CDLL(str(library))

@@ -47,6 +47,20 @@ def own_folder(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder that is gone at the end; a signal to end waits while it is made and while it is removed."""
+    from tempfile import TemporaryDirectory  # late: few need it
+
+    with later_signals():
+        made = TemporaryDirectory()
+    try:
+        yield Path(made.name)
+    finally:
+        with later_signals():
+            made.cleanup()
+
+
+@contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised.
 

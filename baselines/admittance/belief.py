@@ -16,6 +16,9 @@ from birthsim_env.physics.compiled.records import Rows, row, rows
 TIME = 0.05
 """s; assumed: quicker than what a hand notices, slower than the loop, whose slowest pole is at some 35 1/s."""
 
+ARRIVED = 1e-3
+"""1; assumed: with so much left of the way, a lane counts as having come to what it was told."""
+
 RIG = Constants.model.first + AssumedParameters.rig.first
 """Where the rig begins among the constants."""
 
@@ -46,9 +49,10 @@ def believe(belief: Belief, i: int, memory: Memory, constants: Constants, own: C
         belief.rig[k, i] = told + left * (belief.rig[k, i] - told)
         own.rows[RIG + k] = belief.rig[k, i]
     own.compliance.rows[0] = own.model.rig.mass
-    for k in range(2):
-        memory.friction.level[k, i] += (1.0 - left) * belief.news[i] * (1.0 - memory.friction.level[k, i])
-    belief.news[i] *= left
+    if belief.news[i] > ARRIVED:
+        belief.news[i] *= left
+        for k in range(2):
+            memory.friction.level[k, i] = 1.0 + left * (memory.friction.level[k, i] - 1.0)
     if constants.learns_mass == 0.0:
         memory.inertia.mass[i] = own.model.rig.mass
     return left

@@ -173,6 +173,8 @@ class AdmittanceController(StagedController):
         super().__init__(parameters)
         if finds_rig and self.parameters.linkage.is_rail:
             raise ValueError(f"finds_rig = {finds_rig!r} on a rail; allowed: only for a rig of two cylinders")
+        if finds_rig:
+            rig_filter.spread_of(self.parameters)
         self.reads_force = self._force_sensor = bool(force_sensor)
         self._learn, self._identified = bool(learn), bool(identified)
         self._own, self._candidates, self._rows_of_bank, self._rows = gains, 0, 0, 0
@@ -196,8 +198,8 @@ class AdmittanceController(StagedController):
         Raises
         ------
         ValueError
-            Without the option ``own_beliefs``, for another number of rigs or lanes, and for a rig that differs in anything that
-            its lane cannot believe, which is named.
+            Without the option ``own_beliefs``, with ``finds_rig``, for another number of rigs or lanes, and for a rig that
+            differs in anything that its lane cannot believe, which is named.
 
         Examples
         --------
@@ -205,21 +207,26 @@ class AdmittanceController(StagedController):
         >>> law = birthsim.make_controller("admittance[own_beliefs=true]")
         >>> light, heavy = (birthsim.Parameters().replace({"mechanics.mass": mass}) for mass in (2.0, 4.0))
         >>> law.believe([light, heavy])
-        >>> law.believed("mechanics.mass").tolist()
+        >>> law.believed("mass").tolist()
         [2.0, 4.0]
         """
-        if not self._own_beliefs:
-            raise ValueError(f"own_beliefs = {self._own_beliefs!r}; allowed: True, where lanes are told rigs of their own")
-        among = self._told.shape[1] or self._lanes or (1 if isinstance(rig, Parameters) else len(rig))
+        if self._finds_rig or not self._own_beliefs:
+            said = f"own_beliefs = {self._own_beliefs!r}, finds_rig = {self._finds_rig!r}"
+            raise ValueError(f"{said}; allowed: own_beliefs = True alone, where lanes are told rigs of their own")
+        rigs = [rig] if isinstance(rig, Parameters) else list(rig) if isinstance(rig, Sequence) else []
+        if not rigs or not all(isinstance(one, Parameters) for one in rigs):
+            raise ValueError(f"rig = {shown(rig)}; allowed: a Parameters, or a sequence with one for each lane that is told")
+        for one in rigs:
+            self._require_believable(one)
+        known = self._told.shape[1] or self._lanes
         if lanes is None:
-            lanes = np.ones(among, dtype=np.bool_)
-        elif not (self._told.shape[1] or self._lanes):
-            among = len(lanes)
+            lanes = np.ones(known or len(rigs), dtype=np.bool_)
+        among = known or np.size(lanes)
         if np.shape(lanes) != (among,) or np.asarray(lanes).dtype != np.bool_:
             raise ValueError(f"lanes = {shown(lanes)}; allowed: an array of {among} times True or False")
-        for one in (rig,) if isinstance(rig, Parameters) else rig:
-            self._require_believable(one)
-        told = parameter_array(rig, int(np.sum(lanes)))
+        if len(rigs) not in (1, int(np.sum(lanes))):
+            raise ValueError(f"rig has {len(rigs)} entries; allowed: one, or one for each of {int(np.sum(lanes))} lanes")
+        told = parameter_array(rigs[0] if len(rigs) == 1 else rigs, int(np.sum(lanes)))
         if not self._told.shape[1]:
             self._told = np.repeat(self._p[:, None], among, axis=1)
         self._told[:, lanes] = told
@@ -228,13 +235,26 @@ class AdmittanceController(StagedController):
             now.told[:, lanes], now.news[lanes] = told, 1.0
 
     def believed(self, name: str) -> Array:
-        """What lanes believe in now of a parameter, or of a row that plants compute with, by name, (N,), SI units.
+        """What lanes believe in now.
 
-        Raises ``ValueError`` for an unknown name."""
-        row = name.rpartition(".")[2]
-        if row not in PARAMETER_NAMES:
-            raise ValueError(f"name = {shown(name)}{near(row, PARAMETER_NAMES)}; allowed: {', '.join(PARAMETER_NAMES)}")
-        place = PARAMETER_NAMES.index(row)
+        Parameters
+        ----------
+        name : str
+            Of what plants compute with, ``physics.compiled.lanes.PARAMETER_NAMES``: ``"mass"``, ``"fc1"``, ``"area_p2"``.
+
+        Returns
+        -------
+        array, (N,)
+            SI units. Before the first period it is what lanes will begin with.
+
+        Raises
+        ------
+        ValueError
+            For an unknown name.
+        """
+        if name not in PARAMETER_NAMES:
+            raise ValueError(f"name = {shown(name)}{near(str(name), PARAMETER_NAMES)}; allowed: {', '.join(PARAMETER_NAMES)}")
+        place = PARAMETER_NAMES.index(name)
         if self._own_beliefs and self._lanes:
             now: Array = self._beliefs().rig[place].copy()
             return now
@@ -263,18 +283,7 @@ class AdmittanceController(StagedController):
         """What lanes remember besides: ``Memory`` and the bank of candidates."""
         return self._memories[-1][: self._rows]
 
-    def prepare(self, lanes: int, sampled: bool) -> None:
-        new = (lanes, sampled) != (self._lanes, self._sampled)
-        super().prepare(lanes, sampled)
-        if new:
-            self._tell(np.ones(lanes, dtype=np.bool_))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        super().reset(lanes)
-        if lanes is not None and self._lanes:
-            self._tell(lanes)
-
-    def _tell(self, lanes: Mask) -> None:
+    def begin(self, lanes: Mask) -> None:
         """Lanes that begin anew begin with the rig that they were told."""
         if not self._told.shape[1]:
             return

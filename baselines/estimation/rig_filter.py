@@ -78,6 +78,10 @@ CELLS, FLOW_ERROR = 30.0, 0.15
 """1; found by trial. The first multiplies the variance of a cell, since errors of the model last for some periods; the second
 is what the model errs by, in units of a period's change."""
 
+STIRRED, LEAST_ERROR = 1000.0, 1.0
+"""Pa a period. A chamber that changes by less than the first says less, by the square of the ratio, because what leaks decides
+then, and errs alike for seconds; found by trial. The second is what the model errs by at least; assumed."""
+
 INDEX_FOUND, INDEX_SPREAD = 1.38, 0.05
 """1: polytropic index of chambers, whose walls are slower than their motion, and how far its logarithm may be off. Measured on
 the plant: with its own parameters 1.4 leaves innovations whiter than 1.2 and 1.3. The spread is assumed."""
@@ -187,8 +191,9 @@ def read_chamber(
     error = measured - expected
     for a in range(SIZE):
         error += slope[a] * (filter_.believed[a, i] - filter_.mean[a, i])
-    own = FLOW_ERROR * (abs(filled) + abs(pressed))
-    correct(filter_, i, slope, error, CELLS * noise * noise + own * own, UNEVEN_FLOWS)
+    change = abs(filled) + abs(pressed)
+    own, share = max(FLOW_ERROR * change, LEAST_ERROR), min(1.0, max(change, LEAST_ERROR) / STIRRED)
+    correct(filter_, i, slope, error, (CELLS * noise * noise + own * own) / (share * share), UNEVEN_FLOWS)
     filter_.pressure[chamber, i] = expected + TRUST * (measured - expected)
     for k in range(OF_CHAMBER):
         psi[first + k, i] *= 1.0 - TRUST
@@ -279,7 +284,12 @@ def tell(filter_: RigFilter, i: int, described: Rig, spread: Array, told: Array)
 
 
 def spread_of(rig: Parameters) -> Array:
-    """Standard deviation (SIZE,) of the logarithms of ``TOLD`` about a rig as described, and of the index."""
+    """Standard deviation (SIZE,) of the logarithms of ``TOLD`` about a rig as described, and of the index.
+
+    Raises ``ValueError`` that names a parameter of zero, which has no logarithm."""
+    for name in TOLD:
+        if not value_of(rig, name) > 0.0:
+            raise ValueError(f"{name} = {value_of(rig, name)!r} of a rig that is to be found; allowed: more than 0")
     logarithms = np.log([[value_of(rig, name), *ends] for name, ends in TOLD.items()])
     off, width = logarithms[:, 1:].mean(axis=1) - logarithms[:, 0], logarithms[:, 2] - logarithms[:, 1]
     return np.array([*np.sqrt(off * off + width * width / 12.0), INDEX_SPREAD])

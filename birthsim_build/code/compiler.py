@@ -6,7 +6,6 @@ import os
 import pickle
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,6 +19,7 @@ from birthsim_build.code.threads import Threads
 from birthsim_build.code.tools import run_tool
 from birthsim_build.image import Words
 from birthsim_env.extras import installation
+from birthsim_env.files import temporary_folder
 from birthsim_env.gradients.source import TEXTS
 from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.sources import source_stamp
@@ -70,8 +70,8 @@ def compile_object(
 def _compiled(request: dict[str, Any], arrays: dict[str, Words]) -> dict[str, bytes]:
     """Ending -> content of the files that the process writes."""
     further = ON_A_WARP if request["threads"] and request["target"] != "wasm" else {}
-    with tempfile.TemporaryDirectory() as folder:
-        place, out = Path(folder) / "data.npz", Path(folder) / "code.o"
+    with temporary_folder() as folder:
+        place, out = folder / "data.npz", folder / "code.o"
         np.savez(place, **arrays)  # type: ignore[arg-type]
         subprocess.run(
             [sys.executable, "-m", "birthsim_build.code.emit"],
@@ -80,7 +80,7 @@ def _compiled(request: dict[str, Any], arrays: dict[str, Words]) -> dict[str, by
             check=True,
             env={**os.environ, **ONE_LANE, **further},
         )
-        return {path.suffix: path.read_bytes() for path in Path(folder).glob("code.*")}
+        return {path.suffix: path.read_bytes() for path in folder.glob("code.*")}
 
 
 def _place(request: dict[str, Any], arrays: dict[str, Words]) -> Path | None:

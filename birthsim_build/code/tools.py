@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from birthsim_env.files import temporary_folder
 from birthsim_env.physics.compiled.kept import cache_folder
 
 
@@ -29,8 +30,8 @@ def tool_environment() -> Iterator[dict[str, str]]:
     if folder is not None:
         yield _at(folder / "tools")
         return
-    with tempfile.TemporaryDirectory() as place:
-        yield _at(Path(place))
+    with temporary_folder() as place:
+        yield _at(place)
 
 
 def _at(folder: Path) -> dict[str, str]:

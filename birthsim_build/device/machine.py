@@ -7,8 +7,6 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +17,7 @@ from birthsim_build.code.compiler import compile_object, require_llvm
 from birthsim_build.code.targets import HOST
 from birthsim_build.code.threads import Threads
 from birthsim_env.extras import installation
+from birthsim_env.files import temporary_folder
 from birthsim_env.physics.rig.values import shown
 
 ROOM = 64
@@ -90,8 +89,8 @@ def _engine(functions: tuple[str, ...], threads: Threads) -> Any:
 def _compiled(functions: tuple[str, ...], target: str, threads: Threads, ending: str) -> bytes:
     require_llvm()
     space, back = (-(-rows // ROOM) * ROOM for rows in (threads.space, threads.back_space))
-    with TemporaryDirectory() as folder:
-        out = Path(folder) / "code.o"
+    with temporary_folder() as folder:
+        out = folder / "code.o"
         compile_object(functions, target, out, threads=threads._replace(space=space, back_space=back))
         return out.with_suffix(ending).read_bytes()
 
@@ -114,8 +113,8 @@ class Cuda:
         return np.asarray(self.arrays.asnumpy(array))
 
     def load(self, functions: tuple[str, ...], threads: Threads) -> Run:
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "code.ptx"
+        with temporary_folder() as folder:
+            path = folder / "code.ptx"
             path.write_bytes(_compiled(functions, "ptx", threads, ".ptx"))
             module = self.arrays.RawModule(path=str(path))
             entries = {name: module.get_function(f"birthsim_{name}") for name in threads.runs}

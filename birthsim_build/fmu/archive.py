@@ -1,6 +1,5 @@
 """FMU files: a description and binaries in a ZIP archive, without Python inside."""
 
-import tempfile
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 from birthsim_build.code.compiler import compile_object, link
 from birthsim_build.fmu.description import model_description
 from birthsim_build.fmu.model import Model
-from birthsim_env.files import whole_file
+from birthsim_env.files import temporary_folder, whole_file
 
 HERE = Path(__file__).parent
 
@@ -26,8 +25,7 @@ BINARIES = {
 def write_fmu(model: Model, version: int, path: Path, targets: Sequence[str] = ("x86-64",)) -> None:
     """Write the FMU of a model for version 2 or 3 of the standard, whole or not at all."""
     name = model.description.identifier
-    with tempfile.TemporaryDirectory() as folder, whole_file(path) as file:
-        place = Path(folder)
+    with temporary_folder() as place, whole_file(path) as file:
         (place / "model.h").write_text(model.header)
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
             _put(archive, "modelDescription.xml", model_description(model.description, version))

@@ -1,10 +1,10 @@
 """How objects become a library."""
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from birthsim_build.code.compiler import EMULATIONS, link
+from birthsim_env.files import temporary_folder
 
 _ELF = ("-shared", "--strip-all", "--gc-sections", "--hash-style=gnu", "--build-id=none", "-z", "separate-code")
 _ZIG = {"x86-64-v3.dll": "x86_64-windows-gnu", "aarch64.dylib": "aarch64-macos"}
@@ -15,10 +15,10 @@ def join(name: str, objects: Mapping[str, bytes], out: Path) -> None:
 
     It depends on nothing but their content: no path, no time and no order of theirs stands in it.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         places = []
         for symbol, content in sorted(objects.items()):
-            places.append(str(Path(folder) / f"{symbol}.o"))
+            places.append(str(folder / f"{symbol}.o"))
             Path(places[-1]).write_bytes(content)
         if name in _ZIG:
             link("cc", "-target", _ZIG[name], "-shared", "-s", "-o", str(out), *places)

@@ -10,13 +10,12 @@ import os
 import runpy
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from birthsim_env.files import make_folder, write_json
+from birthsim_env.files import make_folder, temporary_folder, write_json
 from birthsim_env.gradients.source import TEXTS
 from birthsim_env.physics.compiled import prebuilt
 from birthsim_env.physics.compiled.sources import is_ours
@@ -38,12 +37,12 @@ def record(paths: Iterable[str], library: Path, work: Path) -> tuple[list[str], 
 def _walked(name: str, library: Path, kept: Path) -> dict[str, list[str]]:
     own = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "BIRTHSIM_"))}
     environment = {**own, LIBRARY: str(library), "NUMBA_CACHE_DIR": str(kept)}
-    with tempfile.TemporaryDirectory() as folder:
-        line = [sys.executable, "-m", __name__, name, folder]
+    with temporary_folder() as folder:
+        line = [sys.executable, "-m", __name__, name, str(folder)]
         done = subprocess.run(line, capture_output=True, text=True, errors="replace", env=environment)
         if done.returncode:
             raise RuntimeError(f"the path {name} ends with {done.returncode}: {done.stderr.strip()[-2000:]}")
-        found: dict[str, list[str]] = json.loads((Path(folder) / "asked.json").read_text(encoding="utf-8"))
+        found: dict[str, list[str]] = json.loads((folder / "asked.json").read_text(encoding="utf-8"))
     return found
 
 

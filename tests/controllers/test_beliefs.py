@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.admittance import belief
+from baselines.admittance.rows import Memory
 from baselines.driving import driving
 from baselines.named import make_controller
 from birthsim_env.physics.compiled.lanes import Array
@@ -99,12 +100,24 @@ def test_a_lane_goes_over_to_what_it_is_told_as_the_low_pass_says_and_without_a_
         driven.law.believe(Parameters().replace({"mechanics.mass": 4.0, "air.supply_pressure": 5.6e5}), np.array([False, True]))
         after = driven.run(50)
         left = np.exp(-50 * 0.001 / belief.TIME)
-        np.testing.assert_allclose(driven.law.believed("mechanics.mass"), [3.0, 4.0 - left], rtol=1e-12)
+        np.testing.assert_allclose(driven.law.believed("mass"), [3.0, 4.0 - left], rtol=1e-12)
         usual = np.abs(np.diff(before[-100:], axis=0)).max()
         assert np.abs(after[0, :, 1] - after[0, :, 0]).max() < usual, "less than openings change anyway from period to period"
         assert (after[-1, :, 0] != after[-1, :, 1]).any(), "what is told matters"
         driven.law.reset(np.array([False, True]))
-        assert driven.law.believed("mechanics.mass").tolist() == [3.0, 4.0], "a lane begins anew with what it was told"
+        assert driven.law.believed("mass").tolist() == [3.0, 4.0], "a lane begins anew with what it was told"
+
+
+def test_a_lane_that_is_told_a_rig_forgets_the_level_of_friction_that_it_had_learned():
+    driven = Driven()
+    with closing(driven.env):
+        driven.run(20)
+        memory = Memory(driven.law._memories[-1])
+        memory.friction.level[:] = 1.8  # nothing slides, so that nothing is learned meanwhile
+        driven.law.believe(Parameters().replace({"cylinder2.coulomb_friction": 15.0}), np.array([False, True]))
+        driven.run(50)
+        left = np.exp(-50 * 0.001 / belief.TIME)
+        np.testing.assert_allclose(Memory(driven.law._memories[-1]).friction.level, [[1.8, 1.0 + 0.8 * left]] * 2, rtol=1e-12)
 
 
 def test_each_lane_declares_the_mass_that_it_believes_in():
@@ -120,7 +133,10 @@ def test_each_lane_declares_the_mass_that_it_believes_in():
     ("options", "arguments", "words"),
     [
         ("", (Parameters(),), ("own_beliefs", "True")),
-        ("own_beliefs=true", ([Parameters()] * 2, np.array([True, False])), ("parameters", "1 lanes")),
+        ("own_beliefs=true", ([Parameters()] * 2, np.array([True, False])), ("rig has 2", "1 lanes")),
+        ("finds_rig=true", (Parameters(),), ("finds_rig", "own_beliefs = True alone")),
+        ("own_beliefs=true", ("rig.toml",), ("rig", "a Parameters")),
+        ("own_beliefs=true", ([],), ("rig", "one for each lane")),
         ("own_beliefs=true", (Parameters(), np.array([1.0, 0.0])), ("lanes", "True or False")),
         ("own_beliefs=true", (OTHER_TRACKER,), ("electronics.position_noise", "0.0001")),
         ("own_beliefs=true", (OTHER_FRICTION,), ("friction.law", "'lugre'")),
@@ -137,6 +153,7 @@ def test_what_cannot_be_believed_is_refused_by_name(options, arguments, words):
     ("options", "rig", "words"),
     [
         ("finds_rig=true,force_sensor=false", None, ("finds_rig", "force_sensor is True")),
+        ("finds_rig=true", {"cylinder1.viscous_friction": 0.0}, ("cylinder1.viscous_friction", "more than 0")),
         ("finds_rig=true", {"linkage.kind": "rail"}, ("finds_rig", "two cylinders")),
         ("finds_rig=maybe", None, ("finds_rig", "True or False")),
     ],

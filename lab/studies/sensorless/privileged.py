@@ -50,17 +50,9 @@ class Privileged(StagedController):
             for lanes, fresh, head in zip(stages, self._fresh, heads, strict=True)
         ]
 
-    def prepare(self, lanes: int, sampled: bool) -> None:
-        new = (lanes, sampled) != (self._lanes, self._sampled)
-        super().prepare(lanes, sampled)
-        if new:
-            self.reset(np.ones(lanes, dtype=np.bool_))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        super().reset(lanes)
-        if lanes is not None and self._lanes:
-            for memory, fresh in zip(self._memories, self._fresh, strict=True):
-                memory[:, lanes] = fresh[:, lanes]
+    def begin(self, lanes: Mask) -> None:
+        for memory, fresh in zip(self._memories, self._fresh, strict=True):
+            memory[:, lanes] = fresh[:, lanes]
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """What each law declares for its lane."""
