@@ -6,7 +6,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,8 @@ class ControllerStage:
         The memory of a lane that starts; every lane has its own, (M, N).
     reads_acceleration : bool
         Whether it needs ``Measurement.acceleration``.
+    tables : callable or None
+        Makes what it reads besides for N lanes, a tuple of arrays: ``birthsim_env.loop.stage`` says how kernels read them.
 
     Examples
     --------
@@ -63,6 +65,7 @@ class ControllerStage:
     constants: Array
     fresh: Array
     reads_acceleration: bool = False
+    tables: Callable[[int], tuple[NDArray[Any], ...]] | None = None
 
 
 class StagedController:
@@ -198,7 +201,10 @@ class StagedController:
     def inner_stages(self) -> list[Part]:
         """Policy and law as stages of a closed loop, with what they remember."""
         pairs = zip(self._made, self._memories, strict=True)
-        own = (Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs)
+        own = (
+            Stage(one.function, one.constants, memory, one.tables(self._lanes) if one.tables else (), sees_world=False)
+            for one, memory in pairs
+        )
         return [*self.policy_stages(), *([] if self.asks else [Stage(ask, sees_world=False)]), *own]
 
     def stages(self) -> list[Part]:

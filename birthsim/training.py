@@ -9,10 +9,12 @@ from typing import Any
 
 from agents.policy.files import Policy
 from agents.policy.seeds import load_policy
+from agents.reader.settings import is_reader
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration, override
 from agents.training.time_split import shares
 from baselines.work.side_by_side import side_by_side
+from birthsim import reading
 from birthsim.command_line.settings import JOBS_AT_MOST
 from birthsim.command_line.worlds import check_environment, check_world
 from birthsim_env.extras import installation
@@ -81,7 +83,8 @@ def train(
     ----------
     config : str or path
         A configuration that comes with the package, such as ``"circle"`` or ``"circle_quick"``, or a TOML file with tables
-        ``[training]`` and ``[residual]``.
+        ``[training]`` and ``[residual]``. One with a table ``[reader]``, as ``"rig_reader"``, teaches a network that reads the
+        rig, for ``admittance[reader=FILE]``; ``changes`` are then fields of ``agents.reader.settings.ReaderSettings``.
     out : str or path
         Folder; each seed has one in it. Where it holds a training of the same settings that was interrupted, that goes on, and
         ends with the same policy.
@@ -129,6 +132,10 @@ def train(
     folder = path_of(out)
     if folder is None:
         raise ValueError(f"out = {shown(out)}; allowed: the path of a folder")
+    if is_reader(config):
+        require_extra()
+        own = reading.plan(config, Path(folder), seed, *counted(seeds, jobs), parameters, changes)
+        return Trained(own.out, reading.carry_out(own))
     return carry_out(plan(config, Path(folder), seed, seeds, jobs, parameters, changes))
 
 
@@ -142,10 +149,8 @@ def plan(
     changes: dict[str, Any],
 ) -> Plan:
     """Trainings that can begin; ``ValueError`` names what cannot be."""
-    missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
-    if missing:
-        raise ValueError(f"no {' and no '.join(missing)}; training needs the extra: {installation('agents')}")
-    seeds, jobs = checked_count("seeds", seeds, 1, 10**6), checked_count("jobs", jobs, 1, JOBS_AT_MOST)
+    require_extra()
+    seeds, jobs = counted(seeds, jobs)
     training, residual = load_configuration(config)
     own = [field.name for field in fields(residual)]
     known = [*(field.name for field in fields(training)), *own]
@@ -160,6 +165,18 @@ def plan(
         check_environment(name, residual=True, given="environment =")
         check_world(name, parameters=rig, randomize=training.randomize, sensors=training.sensors, **hand)
     return Plan(training, residual, rig, tuple(range(training.seed, training.seed + seeds)), jobs, make_folder(out))
+
+
+def require_extra() -> None:
+    """Raise ``ValueError`` where what trainings need is missing."""
+    missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
+    if missing:
+        raise ValueError(f"no {' and no '.join(missing)}; training needs the extra: {installation('agents')}")
+
+
+def counted(seeds: int, jobs: int) -> tuple[int, int]:
+    """Numbers of seeds and processes; ``ValueError`` where they are none."""
+    return checked_count("seeds", seeds, 1, 10**6), checked_count("jobs", jobs, 1, JOBS_AT_MOST)
 
 
 def carry_out(plan: Plan) -> Trained:

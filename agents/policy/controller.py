@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.policy.files import read_policy
-from agents.policy.network import PolicyNetwork
 from agents.policy.seeds import best_policy
 from agents.policy.stage import policy_stage
 from agents.residual.corrected import CorrectedController, action_names, memory_names, observation_names
 from agents.residual.settings import ResidualSettings
+from baselines.network import PolicyNetwork
 from birthsim_env.assembly import policy_periods
 from birthsim_env.loop.signals import Mask
 from birthsim_env.loop.stage import Part, Stage

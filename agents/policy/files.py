@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.policy.network import PolicyNetwork
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.residual.settings import ResidualSettings
+from baselines.network import PolicyNetwork
 from birthsim_env.files import finite, whole_file
 from birthsim_env.physics.rig.reading import named
 from birthsim_env.physics.rig.values import problem

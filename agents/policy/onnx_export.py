@@ -19,8 +19,8 @@ import torch
 from numpy.typing import NDArray
 
 from agents.policy.files import Policy
-from agents.policy.network import CLIP, EPSILON, PolicyNetwork, Weights
 from agents.residual.corrected import action_names, observation_names
+from baselines.network import CLIP, EPSILON, PolicyNetwork, Weights
 from birthsim_env.files import whole_file
 from birthsim_env.ids import rig_for
 from birthsim_env.observation import LIMIT

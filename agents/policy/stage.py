@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.policy.network import PolicyNetwork, answer
+from baselines.network import PolicyNetwork, answer
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.stage import TABLE, Stage, block, singles, table3
 from birthsim_env.observation import SCALES, SIZE, look

@@ -18,7 +18,6 @@ from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
-from agents.policy.network import CLIP, EPSILON, PolicyNetwork
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS
@@ -26,6 +25,7 @@ from agents.training.lanes import Lanes, observations
 from agents.training.reached import Reached
 from agents.training.time_split import split
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from baselines.network import CLIP, EPSILON, PolicyNetwork
 from birthsim_env.physics.compiled.lanes import Array
 
 LEAST_RATE = 0.01

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from agents.policy.files import Policy, policy_content, save_policy
-from agents.policy.network import PolicyNetwork
 from agents.residual.privileged import PolicyFunction, acting
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings
 from agents.training.validation import joined, merit, validate
+from baselines.network import PolicyNetwork
 from birthsim_env.physics.rig.parameters import Parameters
 
 LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")

@@ -19,9 +19,9 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from agents.policy.files import Policy
-from agents.policy.network import PolicyNetwork, Statistics
 from agents.residual.privileged import with_true_parameters
 from agents.training.validation import TRAINING_SEED, Score, validate
+from baselines.network import PolicyNetwork, Statistics
 from birthsim_env.physics.rig.parameters import Parameters
 
 LANES = 256

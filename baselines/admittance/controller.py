@@ -8,6 +8,7 @@ With lab ones it halves what the worst rigs lose, but those in the middle hunt f
 """
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,11 +19,13 @@ from baselines.admittance.belief import Belief
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, checked_gains, require_stiffness
-from baselines.estimation import friction_observer, inertial, rig_filter
+from baselines.estimation import friction_observer, inertial, rig_filter, rig_reader
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.hand import friction_candidates
 from baselines.estimation.rig_filter import RigFilter
+from baselines.estimation.rig_reader import RigReader, load_reader
 from baselines.impedance import Impedance, mass_spring_damper
+from baselines.network import PolicyNetwork
 from baselines.staged import ControllerStage, StagedController
 from birthsim_env.loop.rows import INTERMEDIATE, POSITION
 from birthsim_env.loop.signals import Mask, Measurement, Reference
@@ -115,6 +118,8 @@ class AdmittanceController(StagedController):
         own_beliefs: whether lanes may believe in different rigs, which ``believe`` tells them.
         finds_rig: with a force sensor: whether each lane finds ten parameters of its rig while it runs, ``found_rig``, and
             believes in them: mass, supply, bores, friction, lag of the valves and dead volume (``rig_filter``).
+        reader: with a force sensor: the name or the file of a network that corrects what is found (``rig_reader``), by which it
+            ``finds_rig`` too; "" for none.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests; less for a rig above ``HEAVY``.
             rest_push: by how much the position error of a resting piston is multiplied.
@@ -159,6 +164,7 @@ class AdmittanceController(StagedController):
         identified: bool = False,
         own_beliefs: bool = False,
         finds_rig: bool = False,
+        reader: str | Path | PolicyNetwork = "",
         **gains: float,
     ) -> None:
         gains = checked_gains(self, gains)
@@ -166,6 +172,8 @@ class AdmittanceController(StagedController):
         check_flags({**flags, "finds_rig": finds_rig})
         if identified and force_sensor:
             raise ValueError(f"identified = {identified!r} with a force sensor; allowed: only where force_sensor is False")
+        self._reader = load_reader(reader) if isinstance(reader, PolicyNetwork) or reader != "" else None
+        finds_rig = bool(finds_rig) or self._reader is not None
         if finds_rig and not force_sensor:
             raise ValueError(f"finds_rig = {finds_rig!r} without a force sensor; allowed: only where force_sensor is True")
         if gains.get("yielding", 1.0) > 1:
@@ -264,10 +272,17 @@ class AdmittanceController(StagedController):
     def found_rig(self) -> dict[str, tuple[Array, Array]]:
         """Parameter -> what each lane has found of it, (N,), SI units, and the standard deviation of its logarithm, (N,).
 
-        Empty without the option ``finds_rig``, and before the first period."""
+        Empty where it finds none, and before the first period."""
         if not (self._finds_rig and self._lanes):
             return {}
-        return rig_filter.found(RigFilter(self._memories[-1][self._rows + Belief.size :]), self.parameters)
+        filtered = self.rows_of_law()
+        if self._reader is not None:
+            return rig_reader.found(RigReader(self._memories[-1][filtered + RigFilter.size :]), self.parameters)
+        return rig_filter.found(RigFilter(self._memories[-1][filtered:]), self.parameters)
+
+    def rows_of_law(self) -> int:
+        """What the law remembers of a lane with its belief: so many rows stand before what finds the rig."""
+        return self._rows + Belief.size
 
     def _require_believable(self, rig: Parameters) -> None:
         own = self.parameters
@@ -371,14 +386,17 @@ class AdmittanceController(StagedController):
             function, remembered = law.control_each, np.concatenate([fresh, belief.fresh(self._p)])
         if self._finds_rig:
             remembered = np.concatenate([remembered, rig_filter.fresh(rig)])
+        read = np.zeros(0) if self._reader is None else rig_reader.fresh(rig, self._reader)
         constants = Constants.numbers(
             **parameters,
             gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}),
             rows_of_finder=RigFilter.size if self._finds_rig else 0,
+            rows_of_reader=len(read),
             cell_noise=board.pressure_noise,
             spread=rig_filter.spread_of(rig) if self._finds_rig else np.zeros(rig_filter.SIZE),
         )
-        own = ControllerStage(function, constants, remembered)
+        tables = None if self._reader is None else partial(rig_reader.tables, self._reader)
+        own = ControllerStage(function, constants, np.concatenate([remembered, read]), tables=tables)
         return [inertial.controller_stage(rig), own] if inert else [own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

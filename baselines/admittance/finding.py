@@ -1,6 +1,5 @@
-"""What the law gives the filter that finds its rig (``rig_filter``), and what it is told by it: one call a control period."""
+"""What the law gives the filter that finds its rig (``rig_filter``): one call a control period."""
 
-from baselines.admittance.belief import Belief
 from baselines.admittance.rows import Constants, Memory
 from baselines.estimation import dry_friction, rig_filter
 from baselines.estimation.rig_filter import BALANCE, RigFilter
@@ -11,10 +10,8 @@ from birthsim_env.physics.linkage import geometry, mechanics
 
 
 @helper
-def find(
-    finder: RigFilter, belief: Belief, i: int, seen: Seen, memory: Memory, constants: Constants, own: Constants, left: float
-) -> None:
-    """Carries the filter of lane ``i`` on by one period, and tells the lane what it has found.
+def find(finder: RigFilter, i: int, seen: Seen, memory: Memory, constants: Constants, own: Constants, left: float) -> bool:
+    """Carries the filter of lane ``i`` on by one period; returns whether the lane is to be told what was found.
 
     ``own`` are the ``constants`` with the rig that the lane believes in now, ``left`` is what ``believe`` returns."""
     described, p, period = constants.model.rig, own.model.rig, constants.model.period
@@ -22,7 +19,7 @@ def find(
     if memory.fresh[i] > 0.0:
         for chamber in range(4):
             finder.pressure[chamber, i], finder.spool[chamber, i] = seen.pressure[chamber, i], 0.0
-        return
+        return False
     for a in range(rig_filter.SIZE):
         finder.believed[a, i] = finder.told[a, i] + left * (finder.believed[a, i] - finder.told[a, i])
     for chamber in range(4):
@@ -39,7 +36,8 @@ def find(
         )
     finder.since[i] += period
     finder.age[i] += period
-    due, signals = finder.since[i] >= rig_filter.EVERY, column(BALANCE)
+    due: bool = finder.since[i] >= rig_filter.EVERY
+    signals = column(BALANCE)
     _, _, _, _, _, kappa, sine, cosine = geometry.pose(
         joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
     )
@@ -64,4 +62,4 @@ def find(
     finder.fresh[i] = 0.0
     if due:
         finder.since[i] = 0.0
-        rig_filter.tell(finder, i, described, constants.spread, belief.told)
+    return due

@@ -23,8 +23,10 @@ from baselines.admittance.belief import Belief, believe
 from baselines.admittance.finding import find
 from baselines.admittance.rows import Constants, Estimate, Follower, Gains, Memory, OscillationDetector
 from baselines.backstepping.cartesian_law import across, along, load_rates
+from baselines.estimation import rig_filter, rig_reader
 from baselines.estimation.hand.half_wave import sustained
 from baselines.estimation.rig_filter import EAGER, RigFilter
+from baselines.estimation.rig_reader import RigReader
 from baselines.estimation.rows import AssumedParameters
 from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
@@ -194,7 +196,7 @@ def control(world: int, seen: Seen, memory: int, constants: Constants, tables: i
 def control_each(world: int, seen: Seen, memory: int, constants: Constants, tables: int, lane: int, n: int) -> int:
     """``control`` where every lane has a belief of its own, behind what it remembers."""
     rows, found, missed = int(constants.rows_of_memory), int(constants.rows_of_finder), 0
-    believing = rows + Belief.size
+    believing, read = rows + Belief.size, int(constants.rows_of_reader)
     whole, beliefs = block(memory, rows), Belief(block(memory, believing)[rows:])
     remembered, _ = estimator.parts(whole, constants)
     for i in range(n):
@@ -202,9 +204,18 @@ def control_each(world: int, seen: Seen, memory: int, constants: Constants, tabl
         own = Constants(column(Constants.size))
         if found > 0:
             finder = RigFilter(block(memory, believing + found)[believing:])
-            eager = 1.0 if finder.age[i] < EAGER else remembered.follower.moved[i]
-            left = believe(beliefs, i, remembered, constants, own, eager)
-            find(finder, beliefs, i, seen, remembered, constants, own, left)
+            moved = remembered.follower.moved[i]
+            left = believe(beliefs, i, remembered, constants, own, 1.0 if finder.age[i] < EAGER else moved)
+            if find(finder, i, seen, remembered, constants, own, left):
+                rig_filter.bound(finder, i, constants.spread)
+                if read > 0:
+                    reader = RigReader(block(memory, believing + found + read)[believing + found :])
+                    rig_reader.read(reader, finder, i, moved, constants.spread, tables, lane + i)
+                    if finder.heeded[i] > 0.0:
+                        rig_reader.heed(reader, finder, i)
+                elif finder.heeded[i] > 0.0:
+                    rig_filter.heed(finder, i)
+                rig_filter.tell(finder, i, constants.model.rig, beliefs.told)
         else:
             believe(beliefs, i, remembered, constants, own, 1.0)
         missed += advance(signals, whole[:, i : i + 1], estimate, own)

@@ -114,5 +114,6 @@ class Constants(EstimatorParameters):
 
     gains = part(Gains, "of the loop")
     rows_of_finder = number("1", "rows of the filter that finds the rig; 0 where none does")
+    rows_of_reader = number("1", "rows of the network that reads the rig; 0 where none does")
     cell_noise = number("Pa", "standard deviation of a pressure cell")
     spread = rows(rig_filter.SIZE, "1", "standard deviation of the logarithms of what the filter finds, over rigs")

@@ -118,14 +118,19 @@ class RigFilter(Rows):
     first = rows(2 * BALANCE, "SI", "signals of both balances, low-passed once")
     second = rows(2 * BALANCE, "SI", "low-passed twice")
     third = rows(2 * BALANCE, "SI", "low-passed three times")
+    score = rows(2 * SIZE, "1", "sums of slope error/variance, of chambers and then of balances, since they were read")
+    information = rows(2 * SIZE, "1", "likewise of slope^2/variance")
+    heeded = row("1", "1 where the law is told what is found, 0 where something else says what it is told")
     since = row("s", "since the last balance")
     age = row("s", "since the start")
     fresh = row("1", "1 at a new start")
 
 
 @helper
-def correct(filter_: RigFilter, i: int, slope: Array, error: float, variance: float, uneven: float) -> None:
-    """One scalar measurement of lane ``i``: ``error`` = ``slope`` (SIZE,) times what the mean is short of, and noise."""
+def correct(filter_: RigFilter, i: int, kind: int, slope: Array, error: float, variance: float, uneven: float) -> None:
+    """One scalar measurement of lane ``i``: ``error`` = ``slope`` (SIZE,) times what the mean is short of, and noise.
+
+    ``kind`` is 0 for a chamber and 1 for a balance."""
     gain, spread = column(SIZE), variance
     for a in range(SIZE):
         gain[a] = 0.0
@@ -134,6 +139,8 @@ def correct(filter_: RigFilter, i: int, slope: Array, error: float, variance: fl
         spread += (1.0 + uneven) * gain[a] * slope[a]
     error = max(-MOST * math.sqrt(spread), min(MOST * math.sqrt(spread), error))
     for a in range(SIZE):
+        filter_.score[SIZE * kind + a, i] += slope[a] * error / variance
+        filter_.information[SIZE * kind + a, i] += slope[a] * slope[a] / variance
         filter_.mean[a, i] += gain[a] / spread * error
         for b in range(SIZE):
             filter_.covariance[SIZE * a + b, i] -= gain[a] * gain[b] / spread
@@ -193,7 +200,7 @@ def read_chamber(
         error += slope[a] * (filter_.believed[a, i] - filter_.mean[a, i])
     change = abs(filled) + abs(pressed)
     own, share = max(FLOW_ERROR * change, LEAST_ERROR), min(1.0, max(change, LEAST_ERROR) / STIRRED)
-    correct(filter_, i, slope, error, (CELLS * noise * noise + own * own) / (share * share), UNEVEN_FLOWS)
+    correct(filter_, i, 0, slope, error, (CELLS * noise * noise + own * own) / (share * share), UNEVEN_FLOWS)
     filter_.pressure[chamber, i] = expected + TRUST * (measured - expected)
     for k in range(OF_CHAMBER):
         psi[first + k, i] *= 1.0 - TRUST
@@ -234,7 +241,7 @@ def balance(filter_: RigFilter, i: int, cylinder: int, found: float, pressures: 
     error = hand - (mass * specific + level * sliding + viscous * speed - area * difference)
     slip, doubt, pull = SLIP_ERROR * level * max(0.0, 1.0 - abs(sliding)), LEVEL_ERROR * level, PULL_ERROR * mass
     variance = FORCE_ERROR * FORCE_ERROR + pull * pull + slip * slip + doubt * doubt
-    correct(filter_, i, slope, error, BALANCES * variance, UNEVEN_FORCES)
+    correct(filter_, i, 1, slope, error, BALANCES * variance, UNEVEN_FORCES)
 
 
 @helper
@@ -265,18 +272,32 @@ def write_rig(described: Rig, logarithms: Array, p: Rig) -> None:
 
 
 @helper
-def tell(filter_: RigFilter, i: int, described: Rig, spread: Array, told: Array) -> None:
-    """Writes the rig that lane ``i`` is told, rows (PARAMETERS, N), as far as it is certain.
+def certain(logarithm: float, deviation: float) -> float:
+    """What is told of a parameter that is found to be so, with this standard deviation."""
+    return max(0.0, min(1.0, 2.0 - deviation / CERTAIN)) * logarithm
 
-    ``spread`` (SIZE,) is that of rigs."""
+
+@helper
+def bound(filter_: RigFilter, i: int, spread: Array) -> None:
+    """Keeps what is found within what rigs are, whose standard deviations are ``spread`` (SIZE,)."""
+    for a in range(INDEX):
+        most = REACH * spread[a]
+        filter_.mean[a, i] = max(-most, min(most, filter_.mean[a, i]))
+
+
+@helper
+def heed(filter_: RigFilter, i: int) -> None:
+    """What lane ``i`` is told: what is found, as far as it is certain."""
+    for a in range(INDEX):
+        filter_.told[a, i] = certain(filter_.mean[a, i], math.sqrt(max(0.0, filter_.covariance[(SIZE + 1) * a, i])))
+    filter_.told[INDEX, i] = filter_.mean[INDEX, i]
+
+
+@helper
+def tell(filter_: RigFilter, i: int, described: Rig, told: Array) -> None:
+    """Writes the rig that lane ``i`` is told, rows (PARAMETERS, N)."""
     p, logarithms = Rig(column(Rig.size)), column(SIZE)
     for a in range(SIZE):
-        share = 1.0
-        if a != INDEX:
-            most, unsure = REACH * spread[a], math.sqrt(max(0.0, filter_.covariance[(SIZE + 1) * a, i]))
-            filter_.mean[a, i] = max(-most, min(most, filter_.mean[a, i]))
-            share = max(0.0, min(1.0, 2.0 - unsure / CERTAIN))
-        filter_.told[a, i] = share * filter_.mean[a, i]
         logarithms[a] = filter_.told[a, i]
     write_rig(described, logarithms, p)
     for k in range(Rig.size):
@@ -300,7 +321,7 @@ def fresh(rig: Parameters) -> Array:
     spread, index = spread_of(rig), np.zeros(SIZE)
     index[INDEX] = np.log(INDEX_FOUND / rig.air.polytropic_index)
     covariance = np.diag(spread * spread).ravel()
-    return RigFilter.lane(mean=index, told=index, believed=index, covariance=covariance, fresh=1.0, since=-SETTLING)
+    return RigFilter.lane(mean=index, told=index, believed=index, covariance=covariance, heeded=1.0, fresh=1.0, since=-SETTLING)
 
 
 def found(filter_: RigFilter, rig: Parameters) -> dict[str, tuple[Array, Array]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -33,7 +33,7 @@ class Settings:
     """
 
     config: Annotated[str, Parameter(metavar="NAME")] = "circle"
-    """A configuration of agents/configurations, such as circle_quick, or a TOML file."""
+    """A configuration of agents/configurations, such as circle_quick, rig_reader for a network that reads rigs, or a file."""
     algorithm: Annotated[str | None, ALGORITHM] = None
     """How it learns, one of those below; hyperparameters that the configuration does not say are its own."""
     law: Annotated[str | None, Parameter(metavar="NAME")] = None
@@ -64,8 +64,9 @@ class Settings:
 
 def main(settings: Settings) -> None:
     """Train every seed and report; what that needs takes seconds to load."""
+    from agents.reader.settings import is_reader
     from birthsim.command_line.worlds import check_environment
-    from birthsim.training import carry_out, plan, report
+    from birthsim.training import carry_out, plan, report, require_extra
     from birthsim_env.parts.drawn.randomization import described
 
     if settings.env is not None:
@@ -76,7 +77,24 @@ def main(settings: Settings) -> None:
         **{name: getattr(settings, name) for name in CHANGES},
     }
     changes = {name: value for name, value in said.items() if value is not None}
+    if is_reader(settings.config):
+        require_extra()
+        _read(settings, changes)
+        return
     own = plan(settings.config, settings.out, settings.seed, settings.seeds, settings.jobs, settings.parameters, changes)
     print(described(own.rig, own.training.randomize, own.training.sensors))
     report(own, carry_out(own))
+    print(f"written to {settings.out}/")
+
+
+def _read(settings: Settings, changes: dict[str, Any]) -> None:
+    """Teach networks that read a rig."""
+    from birthsim import reading
+
+    if "friction" in changes:
+        changes["frictions"] = (changes.pop("friction"),)
+    own = reading.plan(
+        settings.config, settings.out, settings.seed, settings.seeds, settings.jobs, settings.parameters, changes
+    )
+    reading.report(own, reading.carry_out(own))
     print(f"written to {settings.out}/")

@@ -11,12 +11,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.policy.network import CLIP, EPSILON
 from agents.residual.settings import NO_LAW, ResidualSettings
 from agents.training.lanes import STIFFNESS, observations
 from agents.training.margin import widened
 from agents.training.policy_gradient import LEAST, LEAST_RATE, MET, MOMENTS, OBSERVED
 from agents.training.validation import TRAINING_SEED
+from baselines.network import CLIP, EPSILON
 from birthsim_build.building import write_wasm
 from birthsim_build.device.loops import pieces_of
 from birthsim_build.device.program import key_of, program_of

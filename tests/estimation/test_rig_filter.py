@@ -46,19 +46,28 @@ def test_a_measurement_is_taken_as_kalman_has_it():
     root = rng.normal(size=(SIZE, SIZE))
     before, mean, slope = root @ root.T, rng.normal(size=SIZE), rng.normal(size=SIZE)
     own.mean[:, 0], own.covariance[:, 0] = mean, before.ravel()
-    rig_filter.correct(own, 0, slope, 0.7, 2.5, 4.0)
+    rig_filter.correct(own, 0, 0, slope, 0.7, 2.5, 4.0)
     expected = slope @ before @ slope
     gain = before @ slope / (2.5 + 5.0 * expected)
     np.testing.assert_allclose(own.mean[:, 0], mean + 0.7 * gain, rtol=1e-12)
     np.testing.assert_allclose(own.covariance[:, 0].reshape(SIZE, SIZE), before - np.outer(gain, slope @ before), atol=1e-11)
 
 
+def test_what_measurements_say_adds_up_by_their_kind():
+    own, slopes = filtered(Parameters()), np.random.default_rng(4).normal(size=(2, SIZE))
+    for kind, slope in enumerate(slopes):
+        for error in (0.02, -0.01):
+            rig_filter.correct(own, 0, kind, slope, error, 0.04, 0.0)
+    np.testing.assert_allclose(own.score[:, 0], slopes.ravel() * 0.01 / 0.04, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(own.information[:, 0], 2.0 * slopes.ravel() ** 2 / 0.04, rtol=1e-12)
+
+
 def test_no_error_counts_for_more_than_three_standard_deviations():
     slope = np.eye(SIZE)[SUPPLY]
     far, near = filtered(Parameters()), filtered(Parameters())
     variance = near.covariance[(SIZE + 1) * SUPPLY, 0]
-    rig_filter.correct(far, 0, slope, 1e9, 1.0, 0.0)
-    rig_filter.correct(near, 0, slope, 3.0 * np.sqrt(1.0 + variance), 1.0, 0.0)
+    rig_filter.correct(far, 0, 0, slope, 1e9, 1.0, 0.0)
+    rig_filter.correct(near, 0, 0, slope, 3.0 * np.sqrt(1.0 + variance), 1.0, 0.0)
     np.testing.assert_allclose(far.mean, near.mean, rtol=1e-12)
 
 

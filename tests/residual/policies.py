@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from agents.policy.files import Policy
-from agents.policy.network import PolicyNetwork
 from agents.residual.corrected import observation_names
 from agents.residual.settings import ResidualSettings
+from baselines.network import PolicyNetwork
 
 ENVIRONMENT = "BirthSIM/ProbeResidual-v3"
 SETTINGS = ResidualSettings("backstepping-weight", authority=33.0, time_constant=0.04, policy_period=0.02)

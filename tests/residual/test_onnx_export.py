@@ -16,10 +16,10 @@ import agents
 from agents.policy import onnx_export
 from agents.policy.controller import ResidualController
 from agents.policy.files import Policy
-from agents.policy.network import PolicyNetwork
 from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx
 from agents.residual.corrected import action_names, observation_names
 from agents.residual.settings import ResidualSettings
+from baselines.network import PolicyNetwork
 from tests.console import call
 from tests.residual.policies import ENVIRONMENT, SETTINGS, network, policy
 

@@ -13,9 +13,9 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch.distributions import Distribution
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from agents.policy.network import Layer, PolicyNetwork
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3.algorithm import ByStableBaselines
+from baselines.network import Layer, PolicyNetwork
 
 AVERAGED = 0.05
 """Share of a training over which its policies are averaged."""
