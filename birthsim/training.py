@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,13 +13,15 @@ from agents.policy.seeds import load_policy
 from agents.reader.settings import is_reader
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration, override
+from agents.training.interruption import WORDS, Interrupted
 from agents.training.time_split import shares
 from baselines.work.side_by_side import side_by_side
 from birthsim import reading
 from birthsim.command_line.settings import JOBS_AT_MOST
 from birthsim.command_line.worlds import check_environment, check_world
+from birthsim_env.endings import one_signal_later
 from birthsim_env.extras import installation
-from birthsim_env.files import make_folder, own_folder, write_json
+from birthsim_env.files import make_folder, own_folder, temporary_folder, write_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_count, near, path_of, shown
 
@@ -87,7 +90,7 @@ def train(
         rig, for ``admittance[reader=FILE]``; ``changes`` are then fields of ``agents.reader.settings.ReaderSettings``.
     out : str or path
         Folder; each seed has one in it. Where it holds a training of the same settings that was interrupted, that goes on, and
-        ends with the same policy.
+        ends with the same policy, checkpoint and events as one that never was.
     seed : int, optional
         First seed, else the configuration's.
     seeds : int
@@ -111,6 +114,8 @@ def train(
     ValueError
         Names the argument, its value and what is allowed; also where the extra ``agents`` is missing, and where ``out`` holds
         a training with other settings.
+    KeyboardInterrupt
+        After Ctrl-C, at the end of the update in which it came, once a checkpoint is written; a second one comes at once.
 
     Notes
     -----
@@ -180,28 +185,45 @@ def counted(seeds: int, jobs: int) -> tuple[int, int]:
 
 
 def carry_out(plan: Plan) -> Trained:
-    """Train every seed."""
-    work = [
-        (replace(plan.training, seed=seed), plan.residual, plan.out / f"seed_{seed}", plan.rig, k % plan.jobs)
-        for k, seed in enumerate(plan.seeds)
-    ]
-    results: dict[int, dict[str, Any]] = {}
-    try:
-        side_by_side(_one, work, plan.jobs, results.__setitem__)
-    except BaseException:
-        if plan.jobs > 1:
-            print(file=sys.stderr)  # the bar of a process that has been ended has no end of line
-        raise
-    return Trained(plan.out, {seed: results[k] for k, seed in enumerate(plan.seeds)})
+    """Train every seed; those side by side end, each with a checkpoint, when this process is asked to end."""
+    results: dict[int, dict[str, Any] | Interrupted] = {}
+    with ExitStack() as stack:
+        ending = None
+        if min(plan.jobs, len(plan.seeds)) > 1:
+            ending = stack.enter_context(temporary_folder()) / "ending"
+            stack.enter_context(one_signal_later(WORDS, ending.touch))
+        work = [
+            (replace(plan.training, seed=seed), plan.residual, plan.out / f"seed_{seed}", plan.rig, k % plan.jobs, ending)
+            for k, seed in enumerate(plan.seeds)
+        ]
+        try:
+            side_by_side(_one, work, plan.jobs, results.__setitem__)
+        except BaseException:
+            if ending:
+                print(file=sys.stderr)  # the bar of a process that has been ended has no end of line
+            raise
+        interrupted = [one for one in results.values() if isinstance(one, Interrupted)]
+        print(*interrupted, sep="\n", end="\n" * bool(interrupted), flush=True)
+    if interrupted:
+        raise OSError("a process that trained was ended; what it has learned is kept, and the same command goes on")
+    reached = {seed: one for k, seed in enumerate(plan.seeds) if not isinstance(one := results[k], Interrupted)}
+    return Trained(plan.out, reached)
 
 
 def _one(
-    settings: TrainingSettings, residual: ResidualSettings, folder: Path, rig: Parameters, position: int
-) -> dict[str, Any]:
+    settings: TrainingSettings, residual: ResidualSettings, folder: Path, rig: Parameters, position: int, ending: Path | None
+) -> dict[str, Any] | Interrupted:
     from agents.training.trainer import train  # Stable-Baselines3 and torch take three seconds to load
 
+    if ending and ending.exists():
+        return Interrupted(f"seed {settings.seed}: interrupted before it began")
     with own_folder(folder):
-        reached = train(settings, residual, folder, rig, position)
+        try:
+            reached = train(settings, residual, folder, rig, position, ending)
+        except Interrupted as interrupted:
+            if ending is None:
+                raise
+            return interrupted
         write_json(folder / "training.json", reached)
     return reached
 

@@ -87,8 +87,8 @@ def assert_picture(folder, name):
     assert "<svg" in (folder / f"{name}.svg").read_text()[:1000]
 
 
-def interrupted(command, arguments, reached):
-    """A command that gets Ctrl-C once ``reached()`` is true: the finished process's status and stdout."""
+def interrupted(command, arguments, reached, ending=signal.SIGINT):
+    """A command that gets Ctrl-C, or another signal, once ``reached()`` is true: the finished process's status and stdout."""
     line = [sys.executable, "-m", *words(command), *map(str, arguments)]
     # Files hold whatever the command says before anybody reads it; pipes would fill up.
     with tempfile.TemporaryFile("w+", encoding="utf-8") as stdout, tempfile.TemporaryFile("w+", encoding="utf-8") as stderr:
@@ -97,7 +97,7 @@ def interrupted(command, arguments, reached):
                 until = time.monotonic() + PATIENCE
                 while not reached() and process.poll() is None and time.monotonic() < until:
                     time.sleep(0.02)
-                process.send_signal(signal.SIGINT)
+                process.send_signal(ending)
                 process.wait(PATIENCE)
             finally:
                 process.kill()

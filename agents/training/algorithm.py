@@ -7,11 +7,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from tqdm import tqdm
-
 if TYPE_CHECKING:
+    from agents.policy.network import PolicyNetwork
     from agents.training.configuration import TrainingSettings
-    from agents.training.reached import Reached
+    from agents.training.watch import Watch
+    from birthsim_env.simulation import Simulation
 
 HYPERPARAMETERS: Mapping[str, Any] = MappingProxyType(
     {
@@ -33,8 +33,17 @@ class Learner(Protocol):
     def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
         """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
 
-    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
-        """Learn to the end, with a validation and a checkpoint at equal intervals; ``began`` is when it was made, s."""
+    def learn(self, watch: Watch, goes_on: bool) -> None:
+        """Learn until ``watch`` says that it is over, which hears of every update; ``goes_on`` after a checkpoint."""
+
+    def network(self) -> PolicyNetwork:
+        """The policy that a validation asks, a copy."""
+
+    def stepping(self) -> tuple[Simulation, float, int]:
+        """Of an environment: its simulation, the time in its policy steps, s, and their number, since ``learn`` began."""
+
+    def save(self, settings: dict[str, Any], past: dict[str, Any]) -> None:
+        """Write a checkpoint of these ``settings`` with this ``past``, between two updates."""
 
 
 class Algorithm:

@@ -18,7 +18,7 @@ from birthsim_env.files import whole_file
 from birthsim_env.physics.rig.values import problem, shown
 
 NAME = "checkpoint.safetensors"
-FORMAT = "birthsim-checkpoint-1"
+FORMAT = "birthsim-checkpoint-2"
 
 Content = dict[str, Any]
 

@@ -36,7 +36,7 @@ class Lanes:
     """Lanes of ``env`` whose episodes are ``seeded``, (N,), and what the policy saw of them last, ``now``."""
 
     def __init__(self, settings: TrainingSettings, env: Any, seeded: list[int]) -> None:
-        self._settings, self.worlds, self.seconds = settings, Worlds(env), 0.0
+        self._settings, self.worlds, self.seconds, self.steps = settings, Worlds(env), 0.0, 0
         self.now = self.worlds.reset(seed=seeded, options={"staggered": True})
         self._declared = Declared(self.worlds.env.simulation)
 
@@ -48,6 +48,7 @@ class Lanes:
             started = time.perf_counter()
             now = worlds.step(now, action)
             self.seconds += time.perf_counter() - started
+            self.steps += 1
             one = self._paid(now) if settings.target == TARGETS[0] else self._apart(before, action, now)
             loss = loss + settings.discount**k * (one + _stiffness_cost(now.observation)).mean()
         self.now = now

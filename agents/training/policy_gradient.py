@@ -6,7 +6,6 @@ the plant forgets an action within some 100 ms, and every step of the horizon is
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -15,18 +14,15 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
-from torch.utils.tensorboard import SummaryWriter
-from tqdm import tqdm
 
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
-from agents.training.events import EVENTS
 from agents.training.lanes import Lanes, observations
-from agents.training.reached import Reached
-from agents.training.time_split import split
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from agents.training.watch import Watch
 from baselines.network import CLIP, EPSILON, PolicyNetwork
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.simulation import Simulation
 
 LEAST_RATE = 0.01
 """Fraction of the learning rate at the end, to which it falls linearly."""
@@ -97,42 +93,18 @@ class PolicyGradient:
         past: dict[str, Any] = content["past"]
         return past
 
-    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
+    def learn(self, watch: Watch, goes_on: bool) -> None:
         """Learn to the end."""
-        settings, validating = self._settings, 0.0
-        writer = SummaryWriter(str(self._folder / EVENTS / "run"), purge_step=self.steps if goes_on else None)
-        before, skipped = reached.seconds, goes_on
-        if not goes_on:
-            validating = time.perf_counter() - began
-        while True:
-            # A checkpoint is written right after a validation, which need not be repeated.
-            ends = self.steps >= settings.steps
-            if not skipped and (reached.is_due(self.steps) or ends):
-                started, network = time.perf_counter(), self.network()
-                # A policy that has learned nothing says zero.
-                metrics = reached.validate(network) if self.steps else dict(reached.metrics["law"])
-                validating += time.perf_counter() - started
-                seconds = time.perf_counter() - began
-                about = self._about(before + seconds, max(seconds - validating, 1e-9))
-                best = reached.add(network, metrics, about)
-                for name, value in reached.events(metrics).items():
-                    writer.add_scalar(name, value, self.steps)
-                bar.set_postfix_str(reached.words(metrics))
-                self._save(reached)
-                if best:
-                    reached.keep()
-            if ends or reached.enough:
-                break
-            skipped = False
+        watch.updated()
+        while not watch.over:
             self._update()
-            bar.update(min(self.steps, settings.steps) - bar.n)
-        writer.close()
+            watch.updated()
 
-    def _about(self, seconds: float, training: float) -> dict[str, Any]:
-        stepping = sum(group.seconds for group in self._groups)
-        stepped = self.steps // self._settings.lanes * len(self._groups)
-        parts = split(self._groups[0].worlds.env.simulation, stepping / stepped) if stepping else {}
-        return {"steps": self.steps, "seconds": seconds, "environment_fraction": stepping / training, "split": parts}
+    def stepping(self) -> tuple[Simulation, float, int]:
+        """Of an environment: its simulation, the time in its policy steps, s, and their number."""
+        groups = self._groups
+        simulation: Simulation = groups[0].worlds.env.simulation
+        return simulation, sum(group.seconds for group in groups), sum(group.steps for group in groups)
 
     def _update(self) -> None:
         """One horizon forward and back in every group of lanes."""
@@ -184,8 +156,9 @@ class PolicyGradient:
         )
         return PolicyNetwork(self._mean, self._variance, layers, squashed=True)
 
-    def _save(self, reached: Reached) -> None:
-        write_checkpoint(self._folder, reached.describe(), self._content(reached.past()))
+    def save(self, settings: dict[str, Any], past: dict[str, Any]) -> None:
+        """Write a checkpoint of these ``settings`` with this ``past``, between two updates."""
+        write_checkpoint(self._folder, settings, self._content(past))
 
     def _content(self, past: dict[str, Any]) -> dict[str, Any]:
         return {

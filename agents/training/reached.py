@@ -48,17 +48,23 @@ class Reached:
                 )
         else:
             self.metrics, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
-            self.keep()
+        self._written = False
+        self.keep()
+
+    @property
+    def _validated(self) -> int:
+        """Policy steps of the last policy that was validated; -1 before the first."""
         curve = self.metrics["curve"]
-        self.seconds: float = curve[-1]["seconds"] if curve else 0.0
+        return curve[-1]["steps"] if curve else -1
 
     def is_due(self, steps: int) -> bool:
-        """Whether ``steps`` have come to the next validation, which then is one interval further."""
-        if steps < self._due:
-            return False
-        every = self._settings.steps / self._settings.validations
-        self._due = min(max(self._due, 0.0) + every, float(self._settings.steps))
-        return True
+        """Whether ``steps`` have come to the next validation."""
+        return steps >= self._due and steps > self._validated
+
+    @property
+    def over(self) -> bool:
+        """Whether all is learned and validated, or enough."""
+        return self.enough or self._validated >= self._settings.steps
 
     @property
     def enough(self) -> bool:
@@ -84,16 +90,18 @@ class Reached:
     def _metrics(self, worlds: Sequence[tuple[Any, PolicyFunction]]) -> dict[str, float]:
         return joined([validate(env, act, target=self._settings.target) for env, act in worlds]).to_dict()
 
-    def add(self, network: PolicyNetwork, metrics: dict[str, float], about: dict[str, Any]) -> bool:
-        """Add to the curve; returns whether the policy is the best so far, for ``keep`` once a checkpoint holds it."""
+    def add(self, network: PolicyNetwork, metrics: dict[str, float], about: dict[str, Any]) -> None:
+        """Add the validation that was due to the curve; ``keep`` writes the policy, where it is the best so far, once a
+        checkpoint holds it."""
         self.metrics["curve"].append({**about, **metrics})
+        every = self._settings.steps / self._settings.validations
+        self._due = min(self._due + every, float(self._settings.steps))
         best = self.metrics["policy"]
         if best is not None and merit(metrics) >= merit(best):
-            return False
-        self.metrics["policy"] = metrics
+            return
+        self.metrics["policy"], self._written = metrics, False
         training = {**self._settings.to_dict(), "law": self.metrics["law"], "reached": metrics}
         self._best = policy_content(Policy(network, self._settings.environment, self._residual, training))
-        return True
 
     def past(self) -> dict[str, Any]:
         """What a checkpoint holds of it, with the best policy: the file that follows is the same or is written anew after a
@@ -101,8 +109,10 @@ class Reached:
         return {"reached": self.metrics, "due": self._due, "best": np.frombuffer(self._best, dtype=np.uint8)}
 
     def keep(self) -> None:
-        """Write the best policy so far."""
-        save_policy(self._best, self._folder)
+        """Write the best policy so far, where there is one that is not written yet."""
+        if self._best and not self._written:
+            save_policy(self._best, self._folder)
+            self._written = True
 
     def events(self, metrics: dict[str, float]) -> dict[str, float]:
         """What TensorBoard shows of a validation."""

@@ -15,20 +15,31 @@ from agents.policy.files import WEIGHTS
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.checkpoint import NAME as CHECKPOINT
 from agents.training.configuration import TrainingSettings, algorithm_of
-from agents.training.events import EVENTS, events_in
+from agents.training.events import EVENTS, Events, events_in
+from agents.training.interruption import WORDS, Interrupted
 from agents.training.margin import widened
 from agents.training.reached import Reached, described
+from agents.training.watch import Watch
+from birthsim_env.endings import one_signal_later
 
 
 def train(
-    settings: TrainingSettings, residual: ResidualSettings, folder: Path, parameters: Any = None, position: int = 0
+    settings: TrainingSettings,
+    residual: ResidualSettings,
+    folder: Path,
+    parameters: Any = None,
+    position: int = 0,
+    ending: Path | None = None,
 ) -> dict[str, Any]:
     """Train one residual policy and write it to ``folder``; returns what was reached.
 
     The policy that is best on the validation worlds is kept (pooled error and its 95 % tail together). It is written whenever
-    it improves. A checkpoint is written at every validation, ``settings.validations`` times. Where ``folder`` has one the
-    training goes on from there, and ends with the same policy as one that was never killed. ``position`` is the row of its
-    progress bar.
+    it improves. A checkpoint is written at every validation, ``settings.validations`` times, every ``watch.PERIOD`` s, and
+    where the training is asked to end: by Ctrl-C, SIGTERM or SIGHUP, which then come after the update during which they came;
+    a second one comes at once. Where ``folder`` has a checkpoint the training goes on from there, and ends with the same
+    policy, checkpoint and events as one that was never killed. ``position`` is the row of its progress bar.
+
+    A training in a process beside others ends once there is a file ``ending``, or by a signal, and raises ``Interrupted``.
 
     Raises ``ValueError`` for a checkpoint that is damaged or of other settings, for a folder with a policy and without its
     checkpoint, and where no validation world is within the rig's strength.
@@ -56,12 +67,21 @@ def train(
     learner = algorithm_of(settings.algorithm).learner(settings, envs, folder)
     began = time.perf_counter()
     past = learner.load(about)
-    if past is not None:
-        done = min(learner.steps, settings.steps)
-        print(f"seed {settings.seed}: {done:,} of {settings.steps:,} steps are there and are kept")
+    kept, watch = learner.steps if past is not None else None, None
+
+    def there(steps: int) -> str:
+        return f"{min(steps, settings.steps):,} of {settings.steps:,} steps are"
+
+    def interrupted() -> str:
+        steps = kept if watch is None else watch.kept
+        what = " before its first checkpoint" if steps is None else f"; {there(steps)} kept in {folder}/"
+        return f"seed {settings.seed}: interrupted{what}"
+
+    if kept is not None:
+        print(f"seed {settings.seed}: {there(kept)} there and are kept")
     bar = tqdm(
         total=settings.steps,
-        initial=min(learner.steps, settings.steps),
+        initial=min(kept or 0, settings.steps),
         desc=f"seed {settings.seed}",
         unit=" steps",
         unit_scale=True,
@@ -69,13 +89,22 @@ def train(
     )
     try:
         reached = Reached(settings, residual, checks, folder, past, paper)
-        if learner.steps < settings.steps and not reached.enough:
-            with events_in(folder / EVENTS):
-                learner.learn(reached, past is not None, bar, began)
+        if not reached.over:
+            with one_signal_later("" if ending else WORDS) as came, events_in(folder / EVENTS):
+
+                def asked() -> bool:
+                    return bool(came) or (ending is not None and ending.exists())
+
+                events = Events(folder, past["events"] if past else {})
+                watch = Watch(learner, reached, events, past or {}, asked, bar, began)
+                learner.learn(watch, past is not None)
+                events.close()
+                if ending:
+                    came.clear()  # this process is one of several, which end together
+            if watch.ended:
+                raise Interrupted(interrupted())
     except KeyboardInterrupt:
-        if (folder / CHECKPOINT).exists():
-            reached.keep()
-            print(f"interrupted after {learner.steps} steps: policy and checkpoint are kept in {folder}/")
+        print(interrupted())
         raise
     finally:
         bar.close()

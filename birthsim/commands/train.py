@@ -28,8 +28,8 @@ class Settings:
     """Train residual policies on top of a controller, by reinforcement learning or by gradients through the loop.
 
     Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
-    whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
-    the same policy.
+    whenever it improves, and a checkpoint every half minute and on Ctrl-C: the same command then goes on, and ends with the
+    same policy, checkpoint and events. After a kill it does so from the last checkpoint.
     """
 
     config: Annotated[str, Parameter(metavar="NAME")] = "circle"

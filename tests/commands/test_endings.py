@@ -3,10 +3,12 @@
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
+from birthsim_env.endings import ENDINGS, one_signal_later
 from birthsim_env.files import own_folder, whole_results
 from tests.console import PATIENCE, ROOT, call
 
@@ -147,6 +149,46 @@ def test_a_signal_that_comes_too_late_changes_nothing():
     """It comes in a destructor, and what the command does is complete before it can come again, or it counts."""
     done = subprocess.run([sys.executable, "-c", UNRAISABLE_AT_THE_END], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) in [(0, ""), (143, "birthsim-x: terminated\n")]
+
+
+def test_the_first_signal_comes_later_unless_it_is_ignored_or_swallowed_and_the_second_at_once(capfd):
+    came, own = [], {number: signal.signal(number, lambda number, _: came.append(number)) for number in ENDINGS}
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with one_signal_later("wait", lambda: came.append("then")) as later:
+            signal.raise_signal(signal.SIGHUP)
+            assert came == later == []
+            signal.raise_signal(signal.SIGTERM)
+            assert (came, later) == (["then"], [signal.SIGTERM])
+        assert came == ["then", signal.SIGTERM]
+        assert capfd.readouterr().out == "\nwait\n"
+        came.clear()
+        with one_signal_later("") as later:
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGINT)
+            assert (came, later) == ([signal.SIGINT], [])
+        assert came == [signal.SIGINT], "once"
+        with one_signal_later("") as later:
+            signal.raise_signal(signal.SIGTERM)
+            later.clear()
+        assert came == [signal.SIGINT]
+    finally:
+        for number, handler in own.items():
+            signal.signal(number, handler)
+    assert capfd.readouterr().out == ""
+
+
+def test_outside_the_main_thread_no_signal_is_put_off():
+    before, seen = signal.getsignal(signal.SIGINT), []
+
+    def elsewhere():
+        with one_signal_later("wait") as later:
+            seen.append((later, signal.getsignal(signal.SIGINT)))
+
+    thread = threading.Thread(target=elsewhere)
+    thread.start()
+    thread.join()
+    assert seen == [([], before)]
 
 
 def test_signals_wait_while_results_replace_others(tmp_path, monkeypatch):

@@ -1,11 +1,14 @@
 """birthsim train: a policy that birthsim evaluate runs, resuming, several seeds side by side, and Ctrl-C."""
 
+import signal
+
 import numpy as np
 import pytest
 
 from agents.policy.files import WEIGHTS, read_policy
 from agents.training.checkpoint import NAME as CHECKPOINT
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
+from tests.training.left import checkpoint_left
 
 
 @pytest.mark.slow
@@ -95,18 +98,19 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_ctrl_c_during_training_keeps_the_best_policies_and_the_checkpoints(jobs, tmp_path, small):
-    """The first checkpoint follows the first validation, before anything is learned, and the first policy follows that.
-
-    A worker that is ended between them leaves its policy in the checkpoint, where the next training finds it.
-    """
+@pytest.mark.parametrize(("jobs", "ending"), [(1, signal.SIGINT), (2, signal.SIGTERM)])
+def test_a_signal_during_training_keeps_what_every_seed_has_learned_and_says_so(jobs, ending, tmp_path, small):
+    """It comes after the first steps of each seed, long before the next validation."""
     folders = [tmp_path / f"seed_{seed}" for seed in range(jobs)]
     arguments = ("--config", small, "--steps", 10**8, "--seeds", jobs, "--jobs", jobs, "--out", tmp_path)
-    status, printed = interrupted("train", arguments, lambda: all((folder / WEIGHTS).is_file() for folder in folders))
-    assert status == 130
-    assert jobs == 2 or "interrupted after" in printed
-    assert jobs == 2 or f"policy and checkpoint are kept in {tmp_path}/seed_0/" in printed
+
+    def learning():
+        return all(any(b"time/fps" in path.read_bytes() for path in folder.rglob("events*")) for folder in folders)
+
+    status, printed = interrupted("train", arguments, learning, ending)
+    assert status == 128 + ending
     for folder in folders:
-        assert (folder / CHECKPOINT).is_file()
+        steps, seed = checkpoint_left(folder)["counts"][0], folder.name.replace("_", " ")
+        assert steps > 0
+        assert f"{seed}: interrupted; {steps:,} of 100,000,000 steps are kept in {folder}/" in printed
         assert read_policy(folder).environment == RESIDUAL

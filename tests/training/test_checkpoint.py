@@ -50,7 +50,7 @@ def test_a_damaged_checkpoint_is_refused_and_nothing_is_unpickled(tmp_path):
     # Every bit of such a file counts: tests/residual/test_policy_damage.py.
     for damaged in [*wrong, content[:-1] + bytes([content[-1] ^ 1])]:
         path.write_bytes(damaged)
-        match = r"(?s) is (no birthsim-checkpoint-1 or )?damaged.*; allowed: a checkpoint that birthsim train wrote$"
+        match = rf"(?s) is (no {FORMAT} or )?damaged.*; allowed: a checkpoint that birthsim train wrote$"
         with pytest.raises(ValueError, match=match) as caught:
             load_checkpoint(tmp_path, model, env, SETTINGS)
         assert repr(str(path)) in str(caught.value)

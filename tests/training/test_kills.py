@@ -1,23 +1,31 @@
-"""Trainings that die: they go on, and end with the policy and the curve of one that never did."""
+"""Trainings that die or are interrupted: they go on, and end with policy, checkpoint and events of one that never was."""
 
+import re
 import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
+from torch.optim.optimizer import register_optimizer_step_post_hook
 
 from agents.policy.files import WEIGHTS, read_policy
 from agents.residual.settings import ResidualSettings
-from agents.training import policy_gradient, reached
+from agents.training import policy_gradient, reached, watch
 from agents.training.checkpoint import NAME
-from agents.training.sb3 import monitor
+from agents.training.configuration import override
+from agents.training.interruption import Interrupted
+from agents.training.sb3 import learner, monitor
 from agents.training.sb3.checkpoint import save_checkpoint
 from agents.training.trainer import train
+from birthsim_env.registry import names
 from tests.console import PATIENCE, ROOT, run, strict
 from tests.training.brief import TINY, steady
+from tests.training.left import checkpoint_left, events_left
 from tests.training.test_policy_gradient import BESIDE, INFORMED, PURE, SHORT
 
 RESIDUAL = ResidualSettings("backstepping-force-first", "variable_kp")
@@ -28,7 +36,7 @@ class Killed(Exception):
 
 
 def killed(monkeypatch, settings, residual, folder, place, name, count):
-    """Train until a method of the monitor is entered, or a file is written, for the ``count``-th time."""
+    """Train until a method is entered, or a file is written, for the ``count``-th time."""
     calls, own = [], getattr(place, name)
 
     def die(*args):
@@ -43,8 +51,9 @@ def killed(monkeypatch, settings, residual, folder, place, name, count):
             train(settings, residual, folder)
 
 
-STEP, CHECK, ROLLOUT = ((monitor.Monitor, name) for name in ("_on_step", "_check", "_on_rollout_start"))
-FILES = [(monitor, "save_checkpoint", 2), (reached, "save_policy", 2)]
+STEP, ROLLOUT = ((monitor.Monitor, name) for name in ("_on_step", "_on_rollout_start"))
+CHECK = watch.Watch, "_validate"
+FILES = [(learner, "save_checkpoint", 2), (reached, "save_policy", 2)]
 SLOW = pytest.mark.slow
 UPDATE = (policy_gradient.PolicyGradient, "_update", 60)
 """Some way beyond the validation half way."""
@@ -85,18 +94,158 @@ def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(
         assert steady(ended["curve"]) == steady(expected["curve"])
         assert steady([ended["law"], ended["policy"]]) == steady([expected["law"], expected["policy"]])
         assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(ended["curve"]))
+        assert checkpoint_left(folder) == checkpoint_left(tmp_path / "whole")
+        assert events_left(folder) == events_left(tmp_path / "whole")
+
+
+BRIEFLY = {
+    **{name: {"steps": 512, "rollout": 4, "batch": 16} for name in ("ppo", "recurrent-ppo", "apg")},
+    **{name: {"steps": 512} for name in ("sac", "tqc")},
+}
+"""What makes a training of ``TINY`` brief, with several updates between two validations."""
+
+LONG = {"apg": SLOW, "sac": SLOW, "tqc": pytest.mark.weekly}
+"""Those of which it takes long all the same."""
+
+
+@contextmanager
+def optimized(act, count):
+    """Call ``act`` at the ``count``-th step of an optimizer, within an update of whatever algorithm."""
+    steps = []
+
+    def hook(*_):
+        steps.append(None)
+        if len(steps) == count:
+            act()
+
+    handle = register_optimizer_step_post_hook(hook)
+    try:
+        yield steps
+    finally:
+        handle.remove()
+
+
+def said(printed):
+    """The steps that a training has said it keeps, and those from which one has gone on; None where it says nothing."""
+    found = [re.findall(rf"([\d,]+) of [\d,]+ steps are {word}", printed) for word in ("kept in", "there and are kept")]
+    return [int(one[-1].replace(",", "")) if one else None for one in found]
+
+
+def die():
+    raise Killed
+
+
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        pytest.param(name, marks={"apg": SLOW, "sac": SLOW, "tqc": pytest.mark.weekly}.get(name, ()))
+        for name in names("algorithm")
+    ],
+)
+@pytest.mark.usefixtures("short_probe")
+def test_nothing_is_lost_by_ctrl_c_and_an_update_by_a_kill_and_all_is_as_if_nothing_had_been(
+    tmp_path, monkeypatch, capsys, algorithm
+):
+    """In an update between two validations. With checkpoints at all updates, which the whole training is without."""
+    settings = override(TINY, algorithm=algorithm, **BRIEFLY.get(algorithm, {}))
+    monkeypatch.setattr(watch, "PERIOD", np.inf)
+    with optimized(die, 0) as steps:
+        train(settings, RESIDUAL, tmp_path / "whole")
+    whole, between = tmp_path / "whole", len(steps) // settings.validations
+    folder, begun = tmp_path / "out", []
+
+    def interrupt():
+        begun.append(seen[-1])
+        signal.raise_signal(signal.SIGINT)
+
+    seen, updated = [], watch.Watch.updated
+
+    def watched(own):
+        updated(own)
+        seen.append(own._learner.steps)
+
+    monkeypatch.setattr(watch.Watch, "updated", watched)
+    capsys.readouterr()
+    with optimized(interrupt, between + between // 2), pytest.raises(KeyboardInterrupt):
+        train(settings, RESIDUAL, folder)
+    kept, _ = said(capsys.readouterr().out)
+    curve = [point["steps"] for point in checkpoint_left(folder)["past"]["reached"]["curve"]]
+    assert kept == seen[-1] > begun[0] > curve[-1], "the update is there in which it came, and it came between two validations"
+    monkeypatch.setattr(watch, "PERIOD", 0.0)
+    seen.clear()
+    with optimized(die, between // 2 + between // 3), pytest.raises(Killed):
+        train(settings, RESIDUAL, folder)
+    assert said(capsys.readouterr().out) == [None, kept]
+    last = seen[-1]
+    assert last > kept
+    train(settings, RESIDUAL, folder)
+    assert said(capsys.readouterr().out) == [None, last], "the update is lost in which it died, and no other"
+    assert (folder / WEIGHTS).read_bytes() == (whole / WEIGHTS).read_bytes()
+    assert checkpoint_left(folder) == checkpoint_left(whole)
+    assert events_left(folder) == events_left(whole)
+    assert all(len(dict(points)) == len(points) for points in events_left(whole).values()), "a step has one point"
+
+
+@pytest.mark.parametrize("validating", [True, False])
+@pytest.mark.usefixtures("short_probe")
+def test_ctrl_c_at_the_end_leaves_what_is_missing_to_the_next(tmp_path, monkeypatch, capsys, validating):
+    """While the last policy is validated, or in the last update, after which it is not."""
+    train(TINY, RESIDUAL, tmp_path / "whole")
+    validate, count = reached.Reached.validate, []
+
+    def interrupted(own, network):
+        count.append(signal.raise_signal(signal.SIGINT) if len(count) == TINY.validations - 1 else None)
+        return validate(own, network)
+
+    with monkeypatch.context() as patch:
+        if validating:
+            patch.setattr(reached.Reached, "validate", interrupted)
+        at_the_end = optimized(lambda: signal.raise_signal(signal.SIGINT), 0 if validating else 16)
+        with at_the_end, pytest.raises(KeyboardInterrupt):
+            train(TINY, RESIDUAL, tmp_path / "out")
+    assert said(capsys.readouterr().out) == [TINY.steps, None]
+    left = checkpoint_left(tmp_path / "out")["past"]["reached"]["curve"]
+    assert (left[-1]["steps"] == TINY.steps) == validating
+    train(TINY, RESIDUAL, tmp_path / "out")
+    for found in (checkpoint_left, events_left):
+        assert found(tmp_path / "out") == found(tmp_path / "whole")
+
+
+@pytest.mark.usefixtures("short_probe")
+def test_a_second_ctrl_c_comes_at_once_and_what_is_said_to_be_kept_is(tmp_path, capsys):
+    def twice():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        raise AssertionError("it goes on")
+
+    with optimized(twice, 10), pytest.raises(KeyboardInterrupt):
+        train(TINY, RESIDUAL, tmp_path)
+    kept, _ = said(capsys.readouterr().out)
+    assert kept == checkpoint_left(tmp_path)["counts"][0] == 512
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("short_probe")
+def test_a_handler_that_raises_nothing_does_not_make_a_training_complete(tmp_path):
+    came, before = [], signal.signal(signal.SIGTERM, lambda number, _: came.append(number))
+    try:
+        with optimized(lambda: signal.raise_signal(signal.SIGTERM), 10), pytest.raises(Interrupted, match="640 of 1,024 steps"):
+            train(TINY, RESIDUAL, tmp_path)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert came == [signal.SIGTERM]
 
 
 @pytest.mark.usefixtures("short_probe")
 def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, monkeypatch, capsys):
     def interrupted(*args):
         save_checkpoint(*args)
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(monitor, "save_checkpoint", interrupted)
+    monkeypatch.setattr(learner, "save_checkpoint", interrupted)
     with pytest.raises(KeyboardInterrupt):
         train(TINY, RESIDUAL, tmp_path)
-    assert "interrupted after 0 steps: policy and checkpoint are kept in " in capsys.readouterr().out
+    assert said(capsys.readouterr().out) == [0, None]
     assert read_policy(tmp_path).settings == RESIDUAL
 
 
@@ -139,4 +288,6 @@ def test_a_process_that_is_killed_ends_with_the_same_policy(tmp_path):
     assert "of 4,096 steps are there and are kept" in done.stdout
     cut, whole = (tmp_path / place / "seed_0" for place in ("out", "whole"))
     assert (cut / WEIGHTS).read_bytes() == (whole / WEIGHTS).read_bytes()
+    assert checkpoint_left(cut) == checkpoint_left(whole)
+    assert events_left(cut) == events_left(whole)
     assert steady(strict(cut / "training.json")["curve"]) == steady(strict(whole / "training.json")["curve"])

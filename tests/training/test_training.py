@@ -19,7 +19,7 @@ from agents.training import trainer as training
 from agents.training import validation
 from agents.training.configuration import TrainingSettings, load_configuration
 from agents.training.margin import widened
-from agents.training.sb3 import monitor
+from agents.training.sb3 import learner
 from agents.training.trainer import train
 from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController
@@ -95,9 +95,9 @@ def test_the_other_algorithms_get_better_than_the_law(tmp_path, monkeypatch, cha
 
 def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tmp_path, monkeypatch, short_probe):
     """Four lanes: three at one error and the fourth, on which the tail depends, at another; the third validation is best."""
-    networks, take = [], monitor.network_of
-    monkeypatch.setattr(monitor, "network_of", lambda *args: (networks.append(take(*args)), networks[-1])[1])
-    errors, nothing = iter([(3.0, 3.0), (3.0, 3.0), (1.0, 9.0), (2.0, 2.5), (1.9, 4.0), (2.1, 2.5)]), np.full(4, np.nan)
+    networks, take = [], learner.network_of
+    monkeypatch.setattr(learner, "network_of", lambda *args: (networks.append(take(*args)), networks[-1])[1])
+    errors, nothing = iter([(3.0, 3.0), (1.0, 9.0), (2.0, 2.5), (1.9, 4.0), (2.1, 2.5)]), np.full(4, np.nan)
 
     def scored(env, act, **options):
         most, one = next(errors)

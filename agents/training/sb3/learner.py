@@ -7,19 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from stable_baselines3.common.vec_env import VecNormalize
-from tqdm import tqdm
 
+from agents.policy.network import PolicyNetwork
 from agents.training.configuration import TrainingSettings
-from agents.training.events import EVENTS
-from agents.training.reached import Reached
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.algorithm import ByStableBaselines
-from agents.training.sb3.checkpoint import load_checkpoint
-from agents.training.sb3.model import make_model, unchecked_distributions
+from agents.training.sb3.checkpoint import load_checkpoint, save_checkpoint
+from agents.training.sb3.logged import Logged
+from agents.training.sb3.model import make_model, network_of, unchecked_distributions
 from agents.training.sb3.monitor import Monitor
 from agents.training.sb3.privileged import Privileged
 from agents.training.sb3.shifted_reward import ShiftedReward
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from agents.training.watch import Watch
+from birthsim_env.simulation import Simulation
 
 
 class StableBaselines:
@@ -35,7 +36,7 @@ class StableBaselines:
         per_step = simulation.periods * simulation.period / 0.01
         paid = ShiftedReward(seen, per_step, settings.discount) if settings.discount < 1 else seen
         self._normalized = VecNormalize(paid, gamma=settings.discount)
-        self._model = make_model(algorithm, settings, self._normalized, str(folder / EVENTS))
+        self._model = make_model(algorithm, settings, self._normalized)
         self._normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
 
     @property
@@ -47,10 +48,22 @@ class StableBaselines:
         """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
         return load_checkpoint(self._folder, self._model, self._normalized, settings)
 
-    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
+    def learn(self, watch: Watch, goes_on: bool) -> None:
         """Learn to the end."""
-        callback = Monitor(reached, self._folder, goes_on, self._env, bar, began)
+        self._model.logger.output_formats.append(Logged(watch.events.writer))
         with unchecked_distributions():
             self._model.learn(
-                self._settings.steps - self.steps, callback=callback, reset_num_timesteps=not goes_on, tb_log_name="run"
+                self._settings.steps - self.steps, callback=Monitor(watch, goes_on), reset_num_timesteps=not goes_on
             )
+
+    def network(self) -> PolicyNetwork:
+        """The average of the last policies."""
+        return network_of(self._model.algorithm, self._model.average.module, self._normalized)
+
+    def stepping(self) -> tuple[Simulation, float, int]:
+        """Of the environment: its simulation, the time in its policy steps, s, and their number."""
+        return self._env.env.simulation, self._env.seconds, self._env.steps
+
+    def save(self, settings: dict[str, Any], past: dict[str, Any]) -> None:
+        """Write a checkpoint of these ``settings`` with this ``past``, between two updates."""
+        save_checkpoint(self._folder, self._model, self._normalized, settings, past)

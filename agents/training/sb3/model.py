@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.distributions import Distribution
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
@@ -21,24 +22,22 @@ AVERAGED = 0.05
 """Share of a training over which its policies are averaged."""
 
 
-def make_model(
-    algorithm: ByStableBaselines, settings: TrainingSettings, env: VecNormalize, tensorboard: str | None = None
-) -> Any:
+def make_model(algorithm: ByStableBaselines, settings: TrainingSettings, env: VecNormalize) -> Any:
     """A model of ``algorithm``, which it names, whose mean action is zero everywhere.
 
     Its ``average`` is the exponential average of its policies over the last ``AVERAGED`` of the steps, as far as
     ``average.update_parameters(policy)`` is called after every update: an update may move a policy by more than is left to be
-    learned.
+    learned. Its logger keeps what it is told, and writes it to the formats that it is given.
     """
     shared: dict[str, Any] = {
         "seed": settings.seed,
         "gamma": settings.discount,
         "batch_size": settings.batch,
         "learning_rate": _falling(settings.learning_rate),
-        "tensorboard_log": tensorboard,
         "device": "cpu",
     }
     model = algorithm.make(settings, env, shared)
+    model.set_logger(Logger(None, []))
     algorithm.begin(model.policy, settings)
     decay = max(0.0, 1.0 - algorithm.between(settings) / (AVERAGED * settings.steps))
     averaging: Any = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
