@@ -19,6 +19,7 @@ from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, write_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_count, near, path_of, shown
+from birthsim_env.splits import TRAIN, VALIDATION, split_of
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,20 @@ def plan(
         check_environment(name, residual=True, given="environment =")
         check_world(name, parameters=rig, randomize=training.randomize, sensors=training.sensors, **hand)
     return Plan(training, residual, rig, tuple(range(training.seed, training.seed + seeds)), jobs, make_folder(out))
+
+
+def worlds_of(plan: Plan) -> str:
+    """The splits of a plan's worlds in one line, and a warning where a training leaves the split that it learns on."""
+    from agents.training.validation import SEED_SPACING, training_seeds  # late: it loads what validates
+
+    lanes = [training_seeds(seed, plan.training.lanes) for seed in plan.seeds]
+    said = f"worlds: seeds {lanes[0].start} to {lanes[-1].stop - 1} to learn, of the split {TRAIN.name}; the policy is chosen "
+    said += f"by seeds {VALIDATION.first} to {VALIDATION.first + plan.training.validation_lanes - 1}, of {VALIDATION.name}"
+    beyond = [seed for seed, own in zip(plan.seeds, lanes, strict=True) if split_of(own) != TRAIN.name]
+    if not beyond:
+        return said
+    most = len(TRAIN.ranges[0]) // SEED_SPACING - 1
+    return f"{said}\nwarning: worlds of seed = {beyond[0]} are not of the split {TRAIN.name}; allowed there: 0 to {most}"
 
 
 def carry_out(plan: Plan) -> Trained:

@@ -65,7 +65,7 @@ class Settings:
 def main(settings: Settings) -> None:
     """Train every seed and report; what that needs takes seconds to load."""
     from birthsim.command_line.worlds import check_environment
-    from birthsim.training import carry_out, plan, report
+    from birthsim.training import carry_out, plan, report, worlds_of
     from birthsim_env.parts.drawn.randomization import described
 
     if settings.env is not None:
@@ -78,5 +78,6 @@ def main(settings: Settings) -> None:
     changes = {name: value for name, value in said.items() if value is not None}
     own = plan(settings.config, settings.out, settings.seed, settings.seeds, settings.jobs, settings.parameters, changes)
     print(described(own.rig, own.training.randomize, own.training.sensors))
+    print(worlds_of(own))
     report(own, carry_out(own))
     print(f"written to {settings.out}/")

@@ -19,7 +19,7 @@ from agents.training.sb3.model import make_model, unchecked_distributions
 from agents.training.sb3.monitor import Monitor
 from agents.training.sb3.privileged import Privileged
 from agents.training.sb3.shifted_reward import ShiftedReward
-from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from agents.training.validation import training_seeds
 
 
 class StableBaselines:
@@ -36,7 +36,7 @@ class StableBaselines:
         paid = ShiftedReward(seen, per_step, settings.discount) if settings.discount < 1 else seen
         self._normalized = VecNormalize(paid, gamma=settings.discount)
         self._model = make_model(algorithm, settings, self._normalized, str(folder / EVENTS))
-        self._normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
+        self._normalized.seed(training_seeds(settings.seed, settings.lanes).start)
 
     @property
     def steps(self) -> int:
