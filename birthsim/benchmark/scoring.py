@@ -31,6 +31,9 @@ NAME = "score.json"
 ENVIRONMENT = "BirthSIM/Circle-v2"
 """Where neither an environment nor a suite is asked for."""
 
+SENSORS = "ideal"
+"""Where none are asked for."""
+
 LIBRARIES = ("numpy", "torch", "stable-baselines3", "sb3-contrib", "onnxruntime")
 """Whose versions a row has, of those that are installed."""
 
@@ -81,7 +84,7 @@ def score(
     policy: Any,
     environment: str | None = None,
     *,
-    sensors: str = "ideal",
+    sensors: str = SENSORS,
     force_sensor: bool = True,
     suite: str | None = None,
     episodes: int = 64,
@@ -180,6 +183,9 @@ def plan(
     first = checked_count("seed", first_seed(seed), 0, LARGEST_SEED)
     if suite is not None and environment is not None:
         raise ValueError(f"environment = {shown(environment)} with suite = {shown(suite)}; allowed: one of them")
+    if suite is not None and (sensors != SENSORS or force_sensor is not True):
+        said = f"sensors = {shown(sensors)}, force_sensor = {shown(force_sensor)} with suite = {shown(suite)}"
+        raise ValueError(f"{said}; allowed: without them, each task of a suite has its own")
     if suite is None:
         check_environment(environment or ENVIRONMENT, given="environment =")
         tasks: tuple[BenchmarkTask, ...] = (task_of(environment or ENVIRONMENT, sensors, force_sensor),)

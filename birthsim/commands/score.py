@@ -31,8 +31,8 @@ class Settings(Processes):
     """The hand's force is not measured."""
     episodes: Annotated[int, whole(1, EPISODES)] = 64
     """Worlds of each task."""
-    seed: WorldSeed = 80_000
-    """Seed of the first world, or a split where it begins; the default is that of test."""
+    seed: WorldSeed | None = None
+    """Seed of the first world, or a split where it begins, else test."""
     policy_period: Annotated[float, number("s", above=0.0, most=1.0)] = 0.01
     """Between two actions of an archive, an ONNX file or a function."""
     normalize: Annotated[str | None, Parameter(metavar="FILE")] = None
@@ -47,10 +47,11 @@ def main(settings: Settings) -> None:
     """Run what the folder lacks, print a table and write the row; what that needs takes seconds to load."""
     from birthsim.benchmark.scoring import NAME, judge, plan
     from birthsim.command_line.worlds import warn_of_worlds
+    from birthsim_env.splits import TEST
 
-    force_sensor = not settings.no_force_sensor
-    world = settings.env, settings.sensors, force_sensor, settings.suite, settings.episodes, settings.seed
+    force_sensor, seed = not settings.no_force_sensor, TEST.first if settings.seed is None else settings.seed
+    world = settings.env, settings.sensors, force_sensor, settings.suite, settings.episodes, seed
     own = plan(settings.policy, *world, settings.policy_period, settings.normalize, settings.name)
-    warn_of_worlds(settings.policy, settings.seed, settings.episodes)
+    warn_of_worlds(settings.policy, seed, settings.episodes)
     scored = judge(own, settings.out, settings.jobs, settings.cluster, True)
     print(f"{scored}\n\nwritten to {settings.out}/: {NAME}")

@@ -172,6 +172,8 @@ def test_the_interval_of_all_tasks_is_that_of_rliable():
     [
         ({"suite": "opne"}, r"suite = 'opne'.*; allowed: classic, open"),
         ({"suite": "open", "environment": PROBE}, r"environment = .* with suite = .*; allowed: one of them"),
+        ({"suite": "open", "sensors": "lab"}, r"sensors = 'lab'.* with suite = 'open'; allowed: without"),
+        ({"suite": "open", "force_sensor": False}, r"force_sensor = False with suite = 'open'; allowed: without"),
         ({"environment": "BirthSIM/Square-v1"}, r"environment = 'BirthSIM/Square-v1'; allowed: "),
         ({"sensors": "perfect"}, r"perfect.*allowed: .*ideal"),
         ({"seed": "tset"}, r"split = 'tset'.*allowed: train, validation, scale, test"),
