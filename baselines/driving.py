@@ -120,9 +120,12 @@ class CompiledDriving(Driving):
         self.controller.require_acceleration(measurement)
 
 
-def driving(controller: Controller, name: str | None, options: dict[str, Array] | None = None) -> Driving:
-    """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
-    if isinstance(controller, Deciding) and not options:
-        return HeldDriving(controller, name, {})
+def driving(controller: Controller, name: str | None, options: dict[str, Array] | None = None, asks: bool = False) -> Driving:
+    """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands.
+
+    Whoever ``asks`` calls ``ask`` every ``held_periods``, so that the loop need not stop for a controller that decides seldom.
+    """
+    if asks and isinstance(controller, Deciding):
+        return HeldDriving(controller, name, options or {})
     compiled = isinstance(controller, StagedController) and controller.is_compiled()
     return (CompiledDriving if compiled else Driving)(controller, name, options or {})

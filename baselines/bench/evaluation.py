@@ -245,7 +245,7 @@ def _run_batch(
     progress: bool,
 ) -> None:
     period = rig_for(environment, arguments.get("parameters")).electronics.control_period
-    driver = driving(controller, result.controller)
+    driver = driving(controller, result.controller, asks=True)
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
     if rigs is not None:
         env.simulation.plant.lane_parameters[:] = rigs
