@@ -59,6 +59,18 @@ class Remarking(Protocol):
     def remarks(self) -> list[str]: ...
 
 
+@runtime_checkable
+class Deciding(Protocol):
+    """A controller that decides once in ``held_periods`` control periods; ``command`` holds what ``decide`` has opened.
+
+    What knows that asks ``decide`` itself, so that the closed loop need not stop in between.
+    """
+
+    held_periods: int
+
+    def decide(self, measurement: Measurement, reference: Reference) -> Array: ...
+
+
 CommandFunction = Callable[[Measurement, Reference], Array]
 """A function as a control law: openings as ``Controller.command`` returns them."""
 

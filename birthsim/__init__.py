@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from baselines.named import make_controller as make_controller
     from baselines.staged import ControllerStage as ControllerStage
     from baselines.staged import StagedController as StagedController
+    from birthsim.benchmark.scoring import Scored as Scored
+    from birthsim.benchmark.scoring import score as score
     from birthsim.envs import environments as environments
     from birthsim.envs import make as make
     from birthsim.envs import make_vec as make_vec
@@ -68,6 +70,7 @@ _PLACES = {
     "Plant": "birthsim_env.physics.plant",
     "Policy": "agents.policy.files",
     "Reference": "birthsim_env.loop.signals",
+    "Scored": "birthsim.benchmark.scoring",
     "StagedController": "baselines.staged",
     "StiffnessSchedule": "birthsim_env.parts.stiffness_schedules",
     "Trained": "birthsim.training",
@@ -91,6 +94,7 @@ _PLACES = {
     "policies": "birthsim.names",
     "reference_scores": "birthsim_env.scores",
     "register": "birthsim_env.registry",
+    "score": "birthsim.benchmark.scoring",
     "train": "birthsim.training",
 }
 """Public name -> where it lives; it is imported when it is first used."""

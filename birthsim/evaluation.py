@@ -5,9 +5,10 @@ from pathlib import Path
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import data, merged, overview, table
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
+from baselines.controller import RESIDUAL
 from baselines.work.tasks import run_tasks
 from birthsim.command_line.settings import RANDOMIZE
-from birthsim.command_line.worlds import check_environment, check_world, policy_of, with_options
+from birthsim.command_line.worlds import check_environment, check_world, policy_of, warn_of_worlds, with_options
 from birthsim.commands.evaluate import Settings
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, whole_results, write_json, write_text
@@ -37,6 +38,7 @@ def run(settings: Settings) -> None:
     span = settings.episodes, settings.seed
     pieces = {name: evaluation_tasks(name, controller_settings(name, rig), environment, world, *span) for name in names}
     check_world(settings.env, parameters=rig, **world)  # which compiles: names are looked at before
+    warn_of_worlds([*pieces, *([RESIDUAL] if policies else [])], settings.seed, settings.episodes)
     known = len(pieces)
     if policies:
         from agents.policy.files import WEIGHTS

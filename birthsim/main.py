@@ -31,6 +31,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "evaluate": Command(
             "controllers over seeded episodes, with tables", "--controller backstepping pid --out out/evaluation"
         ),
+        "score": Command("a policy of any library on the benchmark", "residual:circle --out out/score"),
         "tune": Command("a search for a controller's gains", "--controller pid --trials 75 --out out/tune"),
         "identify": Command("a laboratory's own rig, from its log", "log.csv --out rig.toml"),
         "compare": Command("a log beside rigs: where each model leaves it", "log.csv --parameters rig.toml"),

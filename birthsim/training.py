@@ -24,6 +24,7 @@ from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, own_folder, temporary_folder, write_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_count, near, path_of, shown
+from birthsim_env.splits import TRAIN, VALIDATION, split_of
 
 
 @dataclass(frozen=True)
@@ -182,6 +183,20 @@ def require_extra() -> None:
 def counted(seeds: int, jobs: int) -> tuple[int, int]:
     """Numbers of seeds and processes; ``ValueError`` where they are none."""
     return checked_count("seeds", seeds, 1, 10**6), checked_count("jobs", jobs, 1, JOBS_AT_MOST)
+
+
+def worlds_of(plan: Plan) -> str:
+    """The splits of a plan's worlds in one line, and a warning where a training leaves the split that it learns on."""
+    from agents.training.validation import SEED_SPACING, training_seeds  # late: it loads what validates
+
+    lanes = [training_seeds(seed, plan.training.lanes) for seed in plan.seeds]
+    said = f"worlds: seeds {lanes[0].start} to {lanes[-1].stop - 1} to learn, of the split {TRAIN.name}; the policy is chosen "
+    said += f"by seeds {VALIDATION.first} to {VALIDATION.first + plan.training.validation_lanes - 1}, of {VALIDATION.name}"
+    beyond = [seed for seed, own in zip(plan.seeds, lanes, strict=True) if split_of(own) != TRAIN.name]
+    if not beyond:
+        return said
+    most = len(TRAIN.ranges[0]) // SEED_SPACING - 1
+    return f"{said}\nwarning: worlds of seed = {beyond[0]} are not of the split {TRAIN.name}; allowed there: 0 to {most}"
 
 
 def carry_out(plan: Plan) -> Trained:

@@ -29,6 +29,7 @@ def run(job):
     path = folder / f"{name}-{short}-{seed}-{steps}.txt"
     if not path.is_file():
         command = [sys.executable, str(HERE / EXAMPLES[name]), environment, str(steps), str(seed)]
+        command += [str(path.with_suffix(".zip"))] if name == "Stable-Baselines3" else []
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(f"{' '.join(command)}:\n{done.stderr[-2000:]}")

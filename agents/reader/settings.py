@@ -19,7 +19,7 @@ CONFIGURATIONS = Path(__file__).resolve().parent / "configurations"
 """Those that come with the package."""
 
 COUNTS = {
-    "seed": (0, 2**32 - 1), "rounds": (1, 1000), "lanes": (2, 2**16), "updates": (1, 10**6), "batch": (1, 2**16),
+    "seed": (0, 2**32 - 1), "rounds": (1, 100), "lanes": (2, 2**16), "updates": (1, 10**6), "batch": (1, 2**16),
     "hidden": (1, 512),
 }  # fmt: skip
 """Least and largest of what is counted."""

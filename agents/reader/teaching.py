@@ -29,7 +29,7 @@ from birthsim_env.files import make_folder, whole_file
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import problem
 
-SEED, BETWEEN_ROUNDS, BETWEEN_SEEDS = TRAINING_SEED + 700_000, 1000, 10_000_000
+SEED, BETWEEN_ROUNDS, BETWEEN_SEEDS = TRAINING_SEED + 700_000, 1000, 100_000
 """First seed of the worlds, and between those of neighbouring rounds and seeds."""
 
 CHECKED = ("circle", "probe")

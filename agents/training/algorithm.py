@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 if TYPE_CHECKING:
-    from agents.policy.network import PolicyNetwork
     from agents.training.configuration import TrainingSettings
     from agents.training.watch import Watch
+    from baselines.network import PolicyNetwork
     from birthsim_env.simulation import Simulation
 
 HYPERPARAMETERS: Mapping[str, Any] = MappingProxyType(

@@ -18,7 +18,7 @@ from torch import Tensor
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.lanes import Lanes, observations
-from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from agents.training.validation import training_seeds
 from agents.training.watch import Watch
 from baselines.network import CLIP, EPSILON, PolicyNetwork
 from birthsim_env.physics.compiled.lanes import Array
@@ -68,7 +68,7 @@ class PolicyGradient:
         torch.nn.init.zeros_(layers[-1].bias)
         self._policy = torch.nn.Sequential(*(part for layer in layers for part in (layer, torch.nn.Tanh())))
         self._adam = torch.optim.Adam(self._policy.parameters(), lr=settings.learning_rate, betas=MOMENTS)
-        seed = TRAINING_SEED + SEED_SPACING * settings.seed
+        seed = training_seeds(settings.seed, settings.lanes).start
         firsts = [seed + sum(counts[:k]) for k in range(len(counts))]
         self._mean, self._variance = _statistics(envs, firsts)
         self._noise: np.random.Generator | None = None

@@ -15,11 +15,12 @@ from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.metrics import EpisodeMetrics
 from baselines.bench.statistics import LOST_ERROR, penalize_lost, quantile
 from birthsim_env.reward import SETTLED
+from birthsim_env.splits import TRAIN, VALIDATION
 
-VALIDATION_SEED = 1_000_000
-"""First seed of the validation worlds; evaluation seeds stay below it."""
+VALIDATION_SEED = VALIDATION.first
+"""First seed of the validation worlds."""
 
-TRAINING_SEED = 2_000_000
+TRAINING_SEED = TRAIN.first
 """First seed of the training worlds, which neither validation nor evaluation should meet."""
 
 SEED_SPACING = 10_000
@@ -29,6 +30,12 @@ PUSHED = 5.0
 """N: a weaker hand says nothing about the stiffness that it feels."""
 
 Lanes = NDArray[np.float64]
+
+
+def training_seeds(seed: int, lanes: int) -> range:
+    """Seeds of the worlds of a training with ``seed`` in so many lanes."""
+    first = TRAINING_SEED + SEED_SPACING * seed
+    return range(first, first + lanes)
 
 
 @dataclass(frozen=True)

@@ -245,7 +245,7 @@ def _run_batch(
     progress: bool,
 ) -> None:
     period = rig_for(environment, arguments.get("parameters")).electronics.control_period
-    driver = driving(controller, result.controller)
+    driver = driving(controller, result.controller, asks=True)
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
     if rigs is not None:
         env.simulation.plant.lane_parameters[:] = rigs
@@ -253,11 +253,12 @@ def _run_batch(
     asked, simulation = required_strength_ratio(env), env.simulation
     measures = Measures(simulation, env.steps)
     own = measures.own
-    at_once = 1 if measures.stops else AT_ONCE
+    at_once = driver.held_periods or (1 if measures.stops else AT_ONCE)
     title = f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}"
     bar = tqdm(total=env.steps, desc=title, unit=" steps", disable=not progress, leave=False)
     for step in range(0, env.steps, at_once):
         steps = min(at_once, env.steps - step)
+        driver.ask(simulation.measurement, simulation.reference)
         simulation.run(steps)
         terminated = measures.terminated()
         if terminated.any():

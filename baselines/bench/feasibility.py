@@ -16,6 +16,9 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian
 
+FEASIBLE = 0.9
+"""A world that asks for a larger fraction of its rig's strength counts as infeasible; assumed."""
+
 STEP = 0.05
 """s between the instants that are looked at."""
 

@@ -22,6 +22,9 @@ MOST = 10**9
 EPISODES, JOBS_AT_MOST = 1_000_000, 256
 """Most episodes of an evaluation, some 2 kB each, and most processes side by side."""
 
+LARGEST_SEED = 2**32 - 1
+"""Largest seed that an option takes."""
+
 JOBS = 2
 """Processes side by side, unless --jobs says otherwise."""
 
@@ -34,12 +37,16 @@ def whole(least: int = 1, most: int = MOST) -> Parameter:
 
     def read(_: type, tokens: Sequence[Token]) -> int:
         text = tokens[0].value
-        # Digits of other scripts are decimal too; more than 20 of any are too many.
-        if not (text.isascii() and text.isdecimal() and len(text) <= 20 and least <= int(text) <= most):
+        if not _is_whole(text, least, most):
             raise ValueError(f"{text[:40]!r}; allowed: a whole number from {least} to {most}")
         return int(text)
 
     return Parameter(converter=read, metavar=f"{least}..{most}")
+
+
+def _is_whole(text: str, least: int, most: int) -> bool:
+    """Whether it is a whole number in these limits; digits of other scripts are decimal too, more than 20 of any too many."""
+    return text.isascii() and text.isdecimal() and len(text) <= 20 and least <= int(text) <= most
 
 
 def number(unit: str, above: float = -math.inf, most: float = math.inf, least: float = -math.inf) -> Parameter:
@@ -58,6 +65,18 @@ def number(unit: str, above: float = -math.inf, most: float = math.inf, least: f
         return value
 
     return Parameter(converter=read, metavar=unit)
+
+
+def read_world_seed(_: type, tokens: Sequence[Token]) -> int:
+    """A seed in decimal digits, or the first one of the split that is named."""
+    from birthsim_env.splits import SPLITS  # loads what reads a rig
+
+    text = tokens[0].value
+    if text in SPLITS:
+        return SPLITS[text].first
+    if not _is_whole(text, 0, LARGEST_SEED):
+        raise ValueError(f"{text[:40]!r}; allowed: a whole number from 0 to {LARGEST_SEED}, or {', '.join(SPLITS)}")
+    return int(text)
 
 
 def check_cluster(_: type, name: str | None) -> None:
@@ -82,8 +101,11 @@ def named(kind: str, *more: str) -> Callable[[type, Any], None]:
 
 ENV = Parameter(group=WORLD, metavar="ID")
 Env = Annotated[str, ENV, Parameter(help="Environment.")]
-Seed = Annotated[int, whole(0, 2**32 - 1)]
+Seed = Annotated[int, whole(0, LARGEST_SEED)]
 """A seed that NumPy and PyTorch take."""
+WorldSeed = Annotated[int, Parameter(converter=read_world_seed, metavar="SEED")]
+"""The seed of the first world, or the name of a split, which begins with it."""
+
 SENSORS = Parameter(group=WORLD, metavar="NAME", validator=named("sensors"))
 ALGORITHM = Parameter(metavar="NAME", validator=named("algorithm"))
 Sensors = Annotated[str, SENSORS, Parameter(help="Sensor model, one of those below.")]

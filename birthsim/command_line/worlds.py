@@ -1,13 +1,17 @@
 """What commands look at before they begin: the environment, its world, and the controllers' options."""
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import gymnasium
 
+from baselines.controller import RESIDUAL
 from baselines.named import known_options, split_options
 from birthsim_env.ids import environment_ids
 from birthsim_env.physics.rig.values import near
+from birthsim_env.registry import names
+from birthsim_env.splits import GUIDING, VALIDATION, caution
 
 
 def check_environment(name: str, residual: bool = False, given: str = "--env") -> None:
@@ -31,17 +35,27 @@ def check_world(environment: str, **arguments: Any) -> None:
         env.close()
 
 
+def warn_of_worlds(controllers: Iterable[str], seed: int, episodes: int) -> None:
+    """Say in one line on stderr where the worlds of an evaluation have guided what is judged on them.
+
+    A registered controller as it comes learned on no worlds, so that those of training say of it what others do.
+    """
+    learned = any(one == RESIDUAL or one not in names("controller") for one in controllers)
+    if said := caution(range(seed, seed + episodes), GUIDING if learned else (VALIDATION,)):
+        print(f"{sys.argv[0]}: warning: {said}", file=sys.stderr)
+
+
 def policy_of(environment: str) -> str:
     """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v2`` ->
     ``forceps``."""
     return environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()
 
 
-def with_options(names: Sequence[str], entries: Sequence[str]) -> list[str]:
+def with_options(controllers: Sequence[str], entries: Sequence[str]) -> list[str]:
     """Controllers' names with what ``--set`` gives to those that have it; ``ValueError`` for what none of them has."""
     if not entries:
-        return list(names)
-    known = {name: known_options(name) for name in names}
+        return list(controllers)
+    known = {name: known_options(name) for name in controllers}
     for entry in entries:
         option, equals, value = entry.partition("=")
         if not (equals and value and option.isidentifier()):

@@ -15,9 +15,9 @@ from birthsim.command_line.settings import (
     Processes,
     Randomize,
     RigFile,
-    Seed,
     Sensors,
     Set,
+    WorldSeed,
     whole,
 )
 
@@ -38,8 +38,8 @@ class Settings(Parts, Processes):
     set: Set = field(default_factory=list)
     episodes: Annotated[int, whole(1, EPISODES)] = 32
     """Episodes of each controller."""
-    seed: Seed = 0
-    """Seed of the first episode."""
+    seed: WorldSeed = 0
+    """Seed of the first episode, or a split where it begins: train, validation, scale, test. Results to report are of test."""
     sensors: Sensors = "ideal"
     randomize: Randomize = "all"
     """What differs between episodes; sensors: the scenario, and the figures of honest sensors."""

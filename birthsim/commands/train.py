@@ -66,7 +66,7 @@ def main(settings: Settings) -> None:
     """Train every seed and report; what that needs takes seconds to load."""
     from agents.reader.settings import is_reader
     from birthsim.command_line.worlds import check_environment
-    from birthsim.training import carry_out, plan, report, require_extra
+    from birthsim.training import carry_out, plan, report, require_extra, worlds_of
     from birthsim_env.parts.drawn.randomization import described
 
     if settings.env is not None:
@@ -83,6 +83,7 @@ def main(settings: Settings) -> None:
         return
     own = plan(settings.config, settings.out, settings.seed, settings.seeds, settings.jobs, settings.parameters, changes)
     print(described(own.rig, own.training.randomize, own.training.sensors))
+    print(worlds_of(own))
     report(own, carry_out(own))
     print(f"written to {settings.out}/")
 

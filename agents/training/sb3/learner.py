@@ -8,7 +8,6 @@ from typing import Any
 
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.policy.network import PolicyNetwork
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.algorithm import ByStableBaselines
@@ -18,8 +17,9 @@ from agents.training.sb3.model import make_model, network_of, unchecked_distribu
 from agents.training.sb3.monitor import Monitor
 from agents.training.sb3.privileged import Privileged
 from agents.training.sb3.shifted_reward import ShiftedReward
-from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from agents.training.validation import training_seeds
 from agents.training.watch import Watch
+from baselines.network import PolicyNetwork
 from birthsim_env.simulation import Simulation
 
 
@@ -37,7 +37,7 @@ class StableBaselines:
         paid = ShiftedReward(seen, per_step, settings.discount) if settings.discount < 1 else seen
         self._normalized = VecNormalize(paid, gamma=settings.discount)
         self._model = make_model(algorithm, settings, self._normalized)
-        self._normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
+        self._normalized.seed(training_seeds(settings.seed, settings.lanes).start)
 
     @property
     def steps(self) -> int:

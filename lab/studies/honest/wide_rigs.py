@@ -8,6 +8,7 @@ import numpy as np
 
 from baselines.admittance.controller import AdmittanceController
 from baselines.bench.evaluation import evaluate
+from baselines.bench.feasibility import FEASIBLE
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable, penalize_lost, quantile
 from baselines.estimation.rig_filter import TOLD
@@ -23,9 +24,6 @@ from lab.engine.study import Found, Options, Study
 from lab.engine.tables import cells, markdown
 from lab.engine.worlds import worlds
 from lab.studies.comparison.privileged import drawn_rigs
-
-STRENGTH = 0.9
-"""Worlds that ask for a larger fraction of their rig's strength are left out; assumed."""
 
 KNOWS = "admittance-adaptive[own_beliefs=true]"
 """The controller each lane of which is told its rig besides."""
@@ -44,7 +42,7 @@ def measure(scenario: str, controller: str, source: str, rig: dict[str, Any], to
         cast(AdmittanceController, law).believe(drawn_rigs(believed, TOLD, range(seed, seed + episodes)))
     drawn: Arguments = {"randomize": TOLD, "sensors": "honest", "parameters": believed}
     found = evaluate(environment_id(scenario), law, controller, episodes, seed, progress=False, **drawn)
-    within = np.asarray(found.required_strength_ratio) <= STRENGTH
+    within = np.asarray(found.required_strength_ratio) <= FEASIBLE
     values = {name: np.asarray(values) for name, values in found.metrics.items()}
     values["hunting"] = np.fmax(values["hunting_x"], values["hunting_y"])
     named = {"error": values[METRICS[scenario][0]], "stiffness_error": np.abs(values["stiffness_error"])}
@@ -94,7 +92,7 @@ def _shown(content: Content) -> dict[str, str]:
         facts = information.informed(own["controller"], "honest", rig=rig)
         rows.append([f"`{own['controller']}`", *facts, *beyond, shown["stiffness_error"]])
     drawn = worlds(content["settings"]["seed"], content["settings"]["episodes"])
-    said = f"{drawn}, of which those count that ask for at most {100 * STRENGTH:g} % of the rig's strength."
+    said = f"{drawn}, of which those count that ask for at most {100 * FEASIBLE:g} % of the rig's strength."
     table = markdown(rows, rows[0][4:], alike=[row[1] for row in rows[1:]])
     return {"wide_rigs.md": f"{said}\n\n{table}\n"}
 

@@ -17,6 +17,7 @@ from birthsim_env.ids import rig_for
 from birthsim_env.parts.scenarios import environment_id, scored_scenarios
 from birthsim_env.registry import names, register
 from birthsim_env.scores import RIGS, ROLES, SENSORS
+from birthsim_env.splits import SCALE
 from lab.engine.results import Content, written
 from lab.engine.study import Found, Options, Study
 from lab.studies.comparison.grid import default_controllers
@@ -141,7 +142,7 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    {"episodes": 64, "seed": 70000},
+    {"episodes": 64, "seed": SCALE.first},
     _tasks,
     _kept,
     {"returns": "reward", "halves": "reward", "error": "mm", "lost": "", "success": ""},

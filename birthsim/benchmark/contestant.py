@@ -1,0 +1,143 @@
+"""Who is judged: what a user names or hands over, as a controller in a task, and as pieces of work where it has a file."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from agents.foreign.policies import ALLOWED, SUFFIXES, acting_controller, acting_part, read_policy_file
+from agents.foreign.stable_baselines import algorithm_in
+from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash
+from baselines.controller import RESIDUAL, Controller, controller_of, is_ready
+from baselines.named import bare_name, make_controller
+from baselines.work.tasks import Task
+from birthsim.benchmark.pieces import score_piece
+from birthsim.benchmark.suites import BenchmarkTask
+from birthsim_env.extras import installation
+from birthsim_env.parts.own_parts import from_file
+from birthsim_env.physics.rig.values import near, path_of, shown
+from birthsim_env.registry import names
+
+WEIGHTS = "policy.safetensors"
+"""What a folder of ``birthsim train`` has of a policy."""
+
+PLACE = "{task}"
+"""What stands for the task's name in a policy that is another one in each task."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """A policy or controller.
+
+    Parameters
+    ----------
+    name : str
+        In tables and rows: of a path the last part.
+    kind : str
+        What it is: ``controller``, ``residual``, ``policy``, or the algorithm of an archive.
+    given : Any
+        The path or name, or the object.
+    policy_period : float
+        s between two actions of a policy of an environment.
+    normalize : str
+        File of ``VecNormalize``'s statistics, or "".
+    run : int
+        Which of the training seeds of a folder.
+    """
+
+    name: str
+    kind: str
+    given: Any
+    policy_period: float = 0.01
+    normalize: str = ""
+    run: int = 0
+
+    @property
+    def has_file(self) -> bool:
+        """Whether a name or file says all of it, so that it can be evaluated in pieces that are kept."""
+        return isinstance(self.given, str)
+
+    def hash(self, task: BenchmarkTask) -> str:
+        """SHA-256 of its file, of a policy's weights; "" of what has no file."""
+        if not self.has_file:
+            return ""
+        return file_hash(str(self._folder(task) / WEIGHTS) if self.kind == RESIDUAL else self._place(task))
+
+    def pieces(self, task: BenchmarkTask, seeds: range, label: str) -> list[Task]:
+        """Its evaluation in a task as pieces of work."""
+        rig = task.rig
+        own: dict[str, Any] = {"source": self.hash(task), "rig": rig.to_dict()}
+        if self.kind == "controller":
+            own = controller_settings(self._place(task), rig)
+        elif self.kind == RESIDUAL:
+            own |= {"controller": RESIDUAL, "policy": str(self._folder(task))}
+        else:
+            own |= {"controller": self._place(task), "policy_period": self.policy_period, "normalize": self.normalize}
+            own |= {"statistics": file_hash(self.normalize)}
+        span = task.environment, task.world, len(seeds), seeds.start
+        return evaluation_tasks(label, {"kind": self.kind, **own}, *span, work=score_piece)
+
+    def controller(self, task: BenchmarkTask) -> Controller:
+        """Itself as a controller of a task's rig; ``ValueError`` where it is none, or has other spaces."""
+        rig = task.rig
+        if self.kind == "controller":
+            return make_controller(self._place(task), rig) if self.has_file else controller_of(self.given)
+        if self.kind == RESIDUAL:
+            return make_controller(RESIDUAL, rig, policy=self._folder(task))
+        if self.has_file:
+            return read_policy_file(self._place(task), rig, self.policy_period, self.normalize)
+        return acting_controller(self.given, rig, self.policy_period, self.name)
+
+    def _folder(self, task: BenchmarkTask) -> Path:
+        return folders_of(self._place(task))[self.run]
+
+    def _place(self, task: BenchmarkTask) -> str:
+        return str(self.given).replace(PLACE, task.name)
+
+
+def contestants_of(policy: Any, task: BenchmarkTask, policy_period: float, normalize: str) -> list[Contestant]:
+    """What ``policy`` is, looked at in a ``task``: of a folder each training seed. ``ValueError`` names what is allowed."""
+    one = _contestant_of(policy, task, policy_period, normalize)
+    if one.kind != RESIDUAL:
+        return [one]
+    folders = folders_of(one.given.replace(PLACE, task.name))
+    if len(folders) == 1:
+        return [one]
+    return [replace(one, name=f"{one.name} {own.name}", run=k) for k, own in enumerate(folders)]
+
+
+def folders_of(path: str) -> list[Path]:
+    """``policy_folders``; ``ValueError`` where the extra is missing that reads them."""
+    try:
+        from agents.policy.seeds import policy_folders
+    except ImportError as error:
+        raise ValueError(f"{error}; policy = {shown(path)} needs {installation('agents')}") from error
+    return policy_folders(path)
+
+
+def _contestant_of(policy: Any, task: BenchmarkTask, policy_period: float, normalize: str) -> Contestant:
+    text = path_of(policy)
+    if text is None:
+        if is_ready(policy):
+            return Contestant(_called(policy), "controller", policy)
+        found = acting_part(policy)
+        if found is None:
+            raise ValueError(f"policy = {shown(policy)}; allowed: {ALLOWED}")
+        return Contestant(_called(found), "policy", found, policy_period)
+    place = text.replace(PLACE, task.name)
+    own = Contestant(Path(text).name or text, "controller", text, policy_period, normalize)
+    if Path(place).suffix in SUFFIXES:
+        return replace(own, kind=algorithm_in(Path(place)) if place.endswith(SUFFIXES[0]) else "ONNX")
+    if normalize:
+        raise ValueError(f"normalize = {shown(normalize)} with policy = {shown(text)}; allowed: with FILE.zip")
+    if place.rpartition(":")[0].endswith(".py"):
+        return own if acting_part(from_file("policy", place)) is None else replace(own, kind="policy")
+    if place in names("policy") or Path(place).is_dir():
+        return replace(own, kind=RESIDUAL)
+    if bare_name(place) not in names("controller"):
+        known = [*names("controller"), *names("policy")]
+        raise ValueError(f"policy = {shown(text)}{near(place, known)}; allowed: {ALLOWED}")
+    return own
+
+
+def _called(thing: Any) -> str:
+    return str(getattr(thing, "__name__", type(thing).__name__))

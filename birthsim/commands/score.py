@@ -1,0 +1,57 @@
+"""birthsim score: a policy of any library, or a controller, on the test split of an environment or of a suite."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from birthsim.command_line.settings import EPISODES, MANY, WORLD, Processes, Sensors, WorldSeed, number, whole
+
+
+@dataclass(kw_only=True)
+class Settings(Processes):
+    """Judge policies: score, success on feasible worlds and settled error, with 95 % intervals, and a row for the leaderboard.
+
+    A policy is FILE.zip of Stable-Baselines3 (PPO, SAC, TQC, RecurrentPPO), a folder that birthsim train wrote, FILE.onnx,
+    path/to/file.py:Name, or the name of a controller or of a policy of the package. Several are training seeds of one entry. In
+    a suite {task} stands for the task's name, where each task has a policy of its own. Stable-Baselines3's loader unpickles
+    archives, so that they may run code of whoever made them.
+
+    The folder keeps what is complete: after Ctrl-C or a kill the same command goes on.
+    """
+
+    policy: Annotated[list[str], MANY, Parameter(metavar="POLICY...")] = field(kw_only=False)
+    """What is judged."""
+    suite: Annotated[Literal["classic", "open"] | None, Parameter(group=WORLD)] = None
+    """Every task of a suite, instead of one environment."""
+    env: Annotated[str | None, Parameter(group=WORLD, metavar="ID", help="Environment, else BirthSIM/Circle-v2.")] = None
+    sensors: Sensors = "ideal"
+    no_force_sensor: Annotated[bool, Parameter(group=WORLD)] = False
+    """The hand's force is not measured."""
+    episodes: Annotated[int, whole(1, EPISODES)] = 64
+    """Worlds of each task."""
+    seed: WorldSeed | None = None
+    """Seed of the first world, or a split where it begins, else test."""
+    policy_period: Annotated[float, number("s", above=0.0, most=1.0)] = 0.01
+    """Between two actions of an archive, an ONNX file or a function."""
+    normalize: Annotated[str | None, Parameter(metavar="FILE")] = None
+    """What VecNormalize.save wrote, for an archive."""
+    name: Annotated[str | None, Parameter(metavar="NAME")] = None
+    """What the row calls the entry, else the name of the policy."""
+    out: Path
+    """Folder for score.json and what is complete."""
+
+
+def main(settings: Settings) -> None:
+    """Run what the folder lacks, print a table and write the row; what that needs takes seconds to load."""
+    from birthsim.benchmark.scoring import NAME, judge, plan
+    from birthsim.command_line.worlds import warn_of_worlds
+    from birthsim_env.splits import TEST
+
+    force_sensor, seed = not settings.no_force_sensor, TEST.first if settings.seed is None else settings.seed
+    world = settings.env, settings.sensors, force_sensor, settings.suite, settings.episodes, seed
+    own = plan(settings.policy, *world, settings.policy_period, settings.normalize, settings.name)
+    warn_of_worlds(settings.policy, seed, settings.episodes)
+    scored = judge(own, settings.out, settings.jobs, settings.cluster, True)
+    print(f"{scored}\n\nwritten to {settings.out}/: {NAME}")
