@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
-from agents.residual.privileged import with_true_parameters
+from agents.residual.privileged import TRUE_PARAMETERS, with_true_parameters
 from agents.training.differentiated import Differentiated
 from agents.training.validation import TRAINING_SEED, Score, validate
 from birthsim_env.physics.rig.parameters import Parameters
@@ -56,12 +56,18 @@ Round = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
 def teach(teacher: Policy, lessons: Lessons, parameters: Parameters) -> Iterator[tuple[int, PolicyNetwork, Score]]:
     """Before the first and after each round: policy steps so far, the student as it is, and what it reaches in validation.
 
-    An untaught student is the law alone. ``parameters`` is the rig as its owner describes it.
+    An untaught student is the law alone. ``parameters`` is the rig as its owner describes it. Raises ``ValueError`` for a
+    teacher that was told other parameters than ``true_parameters``.
     """
     torch.set_num_threads(1)
     torch.manual_seed(lessons.seed)
     env, checks = (_worlds(teacher, lanes, parameters) for lanes in (LANES, teacher.training["validation_lanes"]))
     inputs, outputs = env.single_observation_space.shape[0], teacher.network.outputs
+    if teacher.network.inputs != inputs + TRUE_PARAMETERS:
+        raise ValueError(
+            f"teacher observes {teacher.network.inputs} numbers; allowed: {inputs + TRUE_PARAMETERS}, of which "
+            f"{TRUE_PARAMETERS} are the true parameters that this version tells"
+        )
     mean, variance = teacher.network.mean[:inputs], teacher.network.variance[:inputs]
     student = Differentiated(inputs, outputs, (lessons.hidden,), lessons.hidden, squashed=False)
     adam = torch.optim.Adam(student.parameters(), lr=RATE)

@@ -1,6 +1,7 @@
 """A student remembers what its teacher is told: DAgger on a problem whose answer is known, and the command that teaches."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import torch
 from agents.policy.files import WEIGHTS, read_policy
 from agents.policy.seeds import best_policy, policy_folders
 from agents.reports.learning_curves import learning_curves
+from agents.residual.privileged import TRUE_PARAMETERS
 from agents.residual.settings import ResidualSettings
 from agents.training import student as module
 from agents.training.configuration import TrainingSettings
@@ -17,6 +19,8 @@ from agents.training.student import _learn
 from agents.training.trainer import train
 from birthsim.command_line.command import perform_with
 from birthsim.commands import distill
+from birthsim_env.physics.rig.parameters import Parameters
+from tests.residual.policies import INPUTS, policy
 
 
 def made(hidden):
@@ -129,6 +133,12 @@ def test_the_same_command_goes_on_with_the_seeds_that_are_not_done(tmp_path, tea
         with pytest.raises(SystemExit):
             told(*command, *change)
     assert taught == [0, 1, 1]
+
+
+def test_a_teacher_that_was_told_other_parameters_is_refused():
+    told = replace(policy(), training={"sensors": "ideal", "randomize": True, "validation_lanes": 2, "privileged": True})
+    with pytest.raises(ValueError, match=rf"teacher observes {INPUTS} numbers; allowed: {INPUTS + TRUE_PARAMETERS}"):
+        next(module.teach(told, module.Lessons(), Parameters()))
 
 
 def test_a_teacher_must_be_told_more(tmp_path, told, capsys):
