@@ -165,7 +165,15 @@ def _order(key: tuple[str, str, float, int]) -> tuple[int, ...]:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    head = ["rigs, sensors", "policy", "period, ms", "seed", "settled error, mm", f"beyond {FAR:g} mm", "lost"]
+    head = [
+        "rigs, sensors",
+        "policy",
+        "period, ms",
+        "seed",
+        "settled error, mm",
+        f"beyond {FAR:g} mm",
+        f"lost or {LOST_ERROR:g} mm off",
+    ]
     head += ["along the push, %", "wiped, mm", "CPU s"]
     rows = [head]
     for one in content["figures"]:
