@@ -20,7 +20,7 @@ from tqdm import tqdm
 from agents.reader.rounds import Round, collect
 from agents.reader.settings import ReaderSettings
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
-from agents.training.student import Student
+from agents.training.differentiated import Differentiated
 from agents.training.validation import TRAINING_SEED, VALIDATION_SEED
 from baselines.estimation.rig_filter import EVERY, SETTLING, SIZE, TOLD, spread_of
 from baselines.estimation.rig_reader import FAR, INPUTS, READ, SUMS, SURE, save_reader
@@ -65,7 +65,7 @@ def teach(settings: ReaderSettings, rig: Parameters, folder: Path, position: int
     collected = time.process_time() - began
     mean = np.mean([one.seen.mean((0, 1), dtype=np.float64) for one in rounds], axis=0)
     deviation = np.mean([one.seen.std((0, 1), dtype=np.float64) for one in rounds], axis=0) + LEAST_DEVIATION
-    student = Student(INPUTS, 2 * READ, settings.hidden)
+    student = untaught(settings.hidden)
     adam = torch.optim.Adam(student.parameters(), lr=settings.learning_rate)
     about = settings.to_dict()
     done = _restored(folder, about, student, adam)
@@ -83,6 +83,11 @@ def teach(settings: ReaderSettings, rig: Parameters, folder: Path, position: int
     reached = {scenario: _reached(settings, rig, student, mean, deviation, scenario) for scenario in CHECKED}
     seconds = {"collecting": collected, "learning": time.process_time() - began - collected}
     return {"settings": about, "weights": _weights(network), "cpu_seconds": seconds, "reached": reached}
+
+
+def untaught(cells: int) -> Differentiated:
+    """A reader that says what the filter finds, to be taught."""
+    return Differentiated(INPUTS, 2 * READ, (cells,), cells, squashed=False)
 
 
 def _weights(network: PolicyNetwork) -> int:
@@ -113,9 +118,9 @@ def _normalized(seen: NDArray[np.float32], mean: NDArray[Any], deviation: NDArra
     return torch.from_numpy(np.clip(x, -CLIP, CLIP).astype(np.float32))
 
 
-def said_of(student: Student, seen: NDArray[np.float32], mean: NDArray[Any], deviation: NDArray[Any]) -> tuple[Any, Any]:
+def said_of(student: Differentiated, seen: NDArray[np.float32], mean: NDArray[Any], deviation: NDArray[Any]) -> tuple[Any, Any]:
     """Means and logarithms of deviations (T, N, READ) that a reader says, in units of the spread of rigs."""
-    answer, _ = student(_normalized(seen, mean, deviation))
+    answer, _ = student(_normalized(seen, mean, deviation), torch.zeros(seen.shape[1], student.cells))
     answer = answer.clamp(-1.0, 1.0)
     found, unsure = (torch.from_numpy(seen[:, :, place]) for place in (MEANS, DEVIATIONS))
     return found + FAR * answer[..., :READ], (unsure + SURE * answer[..., READ:]).clamp(LEAST, MOST)
@@ -132,7 +137,7 @@ def _update(
     rounds: list[Round],
     mean: NDArray[Any],
     deviation: NDArray[Any],
-    student: Student,
+    student: Differentiated,
     adam: torch.optim.Optimizer,
 ) -> None:
     """One step of Adam; what it is on follows from the seed and the number of the update alone."""
@@ -150,15 +155,15 @@ def _update(
     adam.step()
 
 
-def _network(student: Student, mean: NDArray[Any], deviation: NDArray[Any]) -> PolicyNetwork:
+def _network(student: Differentiated, mean: NDArray[Any], deviation: NDArray[Any]) -> PolicyNetwork:
     return student.network(mean, deviation * deviation)
 
 
-def _content(updates: int, student: Student, adam: torch.optim.Optimizer) -> dict[str, Any]:
+def _content(updates: int, student: Differentiated, adam: torch.optim.Optimizer) -> dict[str, Any]:
     return {"updates": updates, "student": dict(student.state_dict()), "adam": adam.state_dict()["state"]}
 
 
-def _restored(folder: Path, about: dict[str, Any], student: Student, adam: torch.optim.Optimizer) -> int:
+def _restored(folder: Path, about: dict[str, Any], student: Differentiated, adam: torch.optim.Optimizer) -> int:
     """How many updates a checkpoint holds, from which student and optimizer go on; 0 where there is none."""
 
     def restore(content: dict[str, Any]) -> dict[str, Any]:
@@ -178,7 +183,7 @@ def _restored(folder: Path, about: dict[str, Any], student: Student, adam: torch
 def _reached(
     settings: ReaderSettings,
     rig: Parameters,
-    student: Student,
+    student: Differentiated,
     mean: NDArray[Any],
     deviation: NDArray[Any],
     scenario: str,

@@ -20,8 +20,8 @@ from birthsim_env.registry import entry, names
 
 COUNTS = {
     "steps": (1, 10**10), "seed": (0, 2**32 - 1), "lanes": (1, 2**16), "rollout": (1, 2**16), "batch": (2, 2**20),
-    "epochs": (1, 1000), "gradient_steps": (1, 1000), "memory": (0, 2048), "validation_lanes": (1, 2**16),
-    "validations": (1, 10**4),
+    "epochs": (1, 1000), "gradient_steps": (1, 1000), "memory": (0, 2048), "horizon": (0, 2**16),
+    "validation_lanes": (1, 2**16), "validations": (1, 10**4),
 }  # fmt: skip
 """Least and largest of what is counted; a batch of one has no spread to normalise its advantages by."""
 
@@ -34,7 +34,9 @@ TARGETS = ("spring", "impedance")
 COLLECTED = 2**22
 """Steps of all lanes that an algorithm keeps between updates: some hundred floats each."""
 
-SPECIAL: dict[str, Any] = {"target": TARGETS[0], "beside": (), "noise": 0.0, "memory": 0, "privileged": False}
+SPECIAL: dict[str, Any] = {
+    "target": TARGETS[0], "beside": (), "noise": 0.0, "memory": 0, "privileged": False, "horizon": 0, "most_cost": 0.0,
+}  # fmt: skip
 """Settings that only some algorithms take, and what they are for the others."""
 
 OF_ALGORITHM: Any = None
@@ -51,16 +53,18 @@ class TrainingSettings:
     """An experiment and its algorithm, whose hyperparameters are its own where they are None.
 
     PPO uses ``rollout``, ``epochs`` and ``gae_lambda``, recurrent PPO also ``memory``, the cells of its policy's memory; SAC
-    and TQC use ``gradient_steps``, per step of all lanes; the analytic policy gradient (apg) uses ``rollout``, its horizon,
-    ``learning_rate`` and ``discount``. It alone takes another ``target`` than the spring, and worlds ``beside`` those of
-    ``environment``, which share the lanes evenly: each an id, and after a space the name of a hand where it is not the
-    scenario's. It alone adds ``noise`` to actions, a normal one whose standard deviation falls linearly to zero: within the
-    overlap of valves a policy that drives them has no gradient without it. The learning rate falls linearly to a hundredth. The
-    training ends early once the pooled settled error of its policy in validation is ``until`` percent below that of the paper's
-    law; with 100 it never ends early. Training draws rigs that oscillate more easily than those of validation, by a ``margin``
-    (``agents.training.margin``). A ``privileged`` policy observes the true parameters of the rig
-    (``agents.residual.privileged``), and runs in no controller. ``friction`` names what the friction of rigs is drawn from, in
-    training and in validation (``parts.drawn.frictions``).
+    and TQC use ``gradient_steps``, per step of all lanes; the analytic policy gradient (apg) uses ``rollout``, ``memory``,
+    ``learning_rate`` and ``discount``. Its gradients go back through the memory to the beginning of a rollout, and through the
+    plant for ``horizon`` policy steps, of which a rollout is a multiple; 0 is the rollout. Where ``most_cost`` m (mm) is not
+    zero, a policy step costs it c m/(c + m) instead of c, so that rigs that are too weak for what is asked do not decide where
+    all go. It alone takes another ``target`` than the spring, and worlds ``beside`` those of ``environment``, which share the
+    lanes evenly: each an id, and after a space the name of a hand where it is not the scenario's. It alone adds ``noise`` to
+    actions, a normal one whose standard deviation falls linearly to zero: within the overlap of valves a policy that drives
+    them has no gradient without it. The learning rate falls linearly to a hundredth. The training ends early once the pooled
+    settled error of its policy in validation is ``until`` percent below that of the paper's law; with 100 it never ends early.
+    Training draws rigs that oscillate more easily than those of validation, by a ``margin`` (``agents.training.margin``). A
+    ``privileged`` policy observes the true parameters of the rig (``agents.residual.privileged``), and runs in no controller.
+    ``friction`` names what the friction of rigs is drawn from, in training and in validation (``parts.drawn.frictions``).
     Raises ``ValueError`` naming what cannot be.
     """
 
@@ -89,6 +93,8 @@ class TrainingSettings:
     beside: tuple[str, ...] = ()
     margin: float = 0.0
     noise: float = 0.0
+    horizon: int = 0
+    most_cost: float = 0.0
     friction: str = ""
 
     def __post_init__(self) -> None:
@@ -113,6 +119,7 @@ class TrainingSettings:
             ("until", "%", 0.0, 100.0),
         ):
             checked_number(name, getattr(self, name), unit, above=low, most=high)
+        checked_number("most_cost", self.most_cost, "mm", least=0.0, most=1e4)
         checked_number("log_std", self.log_std, "-", least=-20.0, most=2.0)
         for name in ("margin", "noise"):
             checked_number(name, getattr(self, name), "-", least=0.0, most=1.0)

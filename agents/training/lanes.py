@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from agents.gradients.rollouts import Now, Worlds
+from agents.residual.privileged import TRUE_NAMES, true_parameters, with_true_parameters
 from agents.residual.settings import LAWS, NO_LAW, ResidualSettings
 from agents.training.configuration import TARGETS, TrainingSettings
 from agents.training.declared import Declared
@@ -29,30 +30,49 @@ reward, a policy on ``admittance`` gave up accuracy for calm."""
 ROUND = 0.1
 """Errors far below this fraction of their unit cost their square: where noise is all that is left there is no kink; assumed."""
 
-Policy = Callable[[Tensor], Tensor]
+Policy = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
+"""Observations (N, D) and what a memory has held (N, H) -> actions (N, size) and what it holds then."""
 
 
 class Lanes:
-    """Lanes of ``env`` whose episodes are ``seeded``, (N,), and what the policy saw of them last, ``now``."""
+    """Lanes of ``env`` whose episodes are ``seeded``, (N,), what the policy saw of them last, ``now``, and what its memory
+    holds of each, ``held`` (N, H)."""
 
     def __init__(self, settings: TrainingSettings, env: Any, seeded: list[int]) -> None:
         self._settings, self.worlds, self.seconds, self.steps = settings, Worlds(env), 0.0, 0
         self.now = self.worlds.reset(seed=seeded, options={"staggered": True})
+        self.held = torch.zeros(len(seeded), settings.memory)
         self._declared = Declared(self.worlds.env.simulation)
 
     def cost(self, policy: Policy) -> Tensor:
-        """What the steps of a horizon cost, summed, in means over the lanes."""
-        settings, worlds, now, loss = self._settings, self.worlds, self.now.detached(), torch.zeros((), dtype=torch.float64)
+        """What the steps of a rollout cost, summed, in means over the lanes.
+
+        Gradients begin anew at its beginning, and those through the plant at that of each horizon.
+        """
+        settings, worlds, now, loss = self._settings, self.worlds, self.now, torch.zeros((), dtype=torch.float64)
+        held, horizon = self.held, settings.horizon or settings.rollout
         for k in range(settings.rollout):
-            action, before = policy(now.observation), now
+            if k % horizon == 0:
+                now = now.detached()
+            (action, held), before = policy(self._seen(now), held), now
             started = time.perf_counter()
             now = worlds.step(now, action)
             self.seconds += time.perf_counter() - started
             self.steps += 1
             one = self._paid(now) if settings.target == TARGETS[0] else self._apart(before, action, now)
-            loss = loss + settings.discount**k * (one + _stiffness_cost(now.observation)).mean()
-        self.now = now
+            one = one + _stiffness_cost(now.observation)
+            if settings.most_cost:
+                one = one * settings.most_cost / (one + settings.most_cost)
+            loss = loss + settings.discount ** (k % horizon) * one.mean()
+            held = _without(now.ended, held)
+        self.now, self.held = now, held.detach()
         return loss
+
+    def _seen(self, now: Now) -> Tensor:
+        """What a policy observes (N, D), without gradients to what it is told."""
+        if not self._settings.privileged:
+            return now.observation
+        return torch.cat([now.observation, torch.from_numpy(true_parameters(self.worlds.env))], dim=1)
 
     def _paid(self, now: Now) -> Tensor:
         """What a policy step costs (N,), in errors of a millimetre and more rather than in their logarithm.
@@ -75,18 +95,26 @@ class Lanes:
         if lanes.any():
             self.now = self.worlds.now(self.worlds.env.reset(options={"reset_mask": lanes})[0])
             self._declared.begin(lanes)
+            self.held = _without(torch.from_numpy(lanes), self.held)
 
     def state(self) -> dict[str, Any]:
         """All that their future depends on."""
         offset = self._declared.motion.offset
-        return {"lanes": self.worlds.env.get_state(), "last": self.now.observation.detach(), "declared": offset}
+        last = self.now.observation.detach()
+        return {"lanes": self.worlds.env.get_state(), "last": last, "held": self.held, "declared": offset}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
         self.worlds.env.set_state(state["lanes"])
         self.now = self.worlds.now(state["last"])
+        self.held = torch.from_numpy(state["held"])
         self._declared = Declared(self.worlds.env.simulation)
         self._declared.motion.offset = np.array(state["declared"])
+
+
+def _without(lanes: Tensor, held: Tensor) -> Tensor:
+    """What is ``held`` (N, H), zero in the lanes of a mask (N,), in which episodes begin."""
+    return held * ~lanes[:, None]
 
 
 def _stiffness_cost(observation: Tensor) -> Tensor:
@@ -100,8 +128,9 @@ def _size(vector: Tensor) -> Tensor:
     return torch.sqrt((vector * vector).sum(dim=0) + ROUND * ROUND)
 
 
-def observations(env: Any, seed: int, lanes: int) -> tuple[list[str], Array]:
-    """Names (D,) and observations (T N, D) of an episode in ``lanes`` lanes under the controller inside ``env``.
+def observations(env: Any, seed: int, lanes: int, privileged: bool = False) -> tuple[list[str], Array]:
+    """Names (D,) and observations (T N, D) of an episode in ``lanes`` lanes under the controller inside ``env``, of a
+    ``privileged`` policy with the true parameters.
 
     Where there is none the paper's drives, or ``admittance`` where a policy is informed of what that one knows.
     """
@@ -111,7 +140,12 @@ def observations(env: Any, seed: int, lanes: int) -> tuple[list[str], Array]:
     observation, _ = driven.reset(seed=[seed + lane for lane in range(lanes)])
     zero, seen = np.zeros(driven.action_space.shape, dtype=np.float32), []
     for _ in range(driven.steps):
-        seen.append(observation.copy())
+        seen.append(with_true_parameters(driven, observation) if privileged else observation.copy())
         observation, *_ = driven.step(zero)
     driven.close()
-    return list(driven.observation_names), np.concatenate(seen).astype(np.float64)
+    return observation_names(driven, privileged), np.concatenate(seen).astype(np.float64)
+
+
+def observation_names(env: Any, privileged: bool) -> list[str]:
+    """What each number says that a policy observes in ``env``."""
+    return [*env.observation_names, *(TRUE_NAMES if privileged else ())]

@@ -1,13 +1,14 @@
 """Analytic policy gradient: the reward of a short horizon is differentiated through the closed loop, and Adam climbs it.
 
 As in SHAC (Xu et al., "Accelerated policy learning with parallel differentiable simulation", ICLR 2022), but without a critic:
-the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/gradients.md`).
+the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/gradients.md`). A policy may
+have a memory, which goes on from one rollout to the next; gradients go back through it to the beginning of a rollout
+(truncated backpropagation through time, Williams and Peng 1990), over several horizons of the plant.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from torch import Tensor
 
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
-from agents.training.lanes import Lanes, observations
+from agents.training.differentiated import Differentiated
+from agents.training.lanes import Lanes, observation_names, observations
 from agents.training.validation import training_seeds
 from agents.training.watch import Watch
 from baselines.network import CLIP, EPSILON, PolicyNetwork
@@ -40,17 +42,18 @@ MOMENTS = (0.9, 0.99)
 """Of Adam; an update is a gradient of length one, so that one bad horizon moves no more than another."""
 
 
-def _statistics(envs: Sequence[Any], seeds: Sequence[int]) -> tuple[Array, Array]:
+def _statistics(envs: Sequence[Any], seeds: Sequence[int], privileged: bool) -> tuple[Array, Array]:
     """Mean and variance (D,) of observations.
 
     They stay as they are: running ones would remember what the first policies see, beside which a millimetre is nothing.
     """
     names, found = zip(
-        *(observations(env, seed, OBSERVED // len(envs)) for env, seed in zip(envs, seeds, strict=True)), strict=True
+        *(observations(env, seed, OBSERVED // len(envs), privileged) for env, seed in zip(envs, seeds, strict=True)),
+        strict=True,
     )
     seen = np.concatenate(found)
     known = dict(zip(names[0], zip(seen.mean(axis=0), seen.var(axis=0), strict=True), strict=True))
-    mean, variance = np.array([known.get(name, (0.0, 0.0)) for name in envs[0].observation_names]).T
+    mean, variance = np.array([known.get(name, (0.0, 0.0)) for name in observation_names(envs[0], privileged)]).T
     return mean.copy(), np.maximum(variance, LEAST**2)
 
 
@@ -61,16 +64,12 @@ class PolicyGradient:
         self._settings, self._folder, self.steps = settings, folder, 0
         torch.manual_seed(settings.seed)
         env, counts = envs[0], [one.num_envs for one in envs]
-        inputs, outputs = env.single_observation_space.shape[0], env.single_action_space.shape[0]
-        widths = (inputs, *settings.hidden, outputs)
-        layers = [torch.nn.Linear(width, wide) for width, wide in pairwise(widths)]
-        torch.nn.init.zeros_(layers[-1].weight)
-        torch.nn.init.zeros_(layers[-1].bias)
-        self._policy = torch.nn.Sequential(*(part for layer in layers for part in (layer, torch.nn.Tanh())))
+        inputs, outputs = len(observation_names(env, settings.privileged)), env.single_action_space.shape[0]
+        self._policy = Differentiated(inputs, outputs, settings.hidden, settings.memory, squashed=True)
         self._adam = torch.optim.Adam(self._policy.parameters(), lr=settings.learning_rate, betas=MOMENTS)
         seed = training_seeds(settings.seed, settings.lanes).start
         firsts = [seed + sum(counts[:k]) for k in range(len(counts))]
-        self._mean, self._variance = _statistics(envs, firsts)
+        self._mean, self._variance = _statistics(envs, firsts, settings.privileged)
         self._noise: np.random.Generator | None = None
         self._groups = [
             Lanes(settings, one, [first + lane for lane in range(count)])
@@ -107,7 +106,7 @@ class PolicyGradient:
         return simulation, sum(group.seconds for group in groups), sum(group.steps for group in groups)
 
     def _update(self) -> None:
-        """One horizon forward and back in every group of lanes."""
+        """One rollout forward and back in every group of lanes."""
         settings = self._settings
         self._noise = np.random.default_rng((settings.seed, self.steps)) if settings.noise else None
         self._adam.zero_grad()
@@ -116,7 +115,7 @@ class PolicyGradient:
         weights = [weight.grad for weight in self._policy.parameters() if weight.grad is not None]
         size = torch.sqrt(sum((gradient * gradient).sum() for gradient in weights))  # type: ignore[arg-type]
         self.steps += settings.rollout * settings.lanes
-        # A horizon in which something collides may have no finite gradient; it teaches nothing.
+        # A rollout in which something collides may have no finite gradient; it teaches nothing.
         if torch.isfinite(size) and size > 0:
             for gradient in weights:
                 gradient /= size
@@ -133,28 +132,25 @@ class PolicyGradient:
         for group, lanes in zip(self._groups, np.split(chosen, len(self._groups)), strict=True):
             group.begin(lanes)
 
-    def _act(self, observation: Tensor) -> Tensor:
-        """Actions (N, size), with noise, for observations (N, D), which are normalised as by ``PolicyNetwork``.
+    def _act(self, observation: Tensor, held: Tensor) -> tuple[Tensor, Tensor]:
+        """Actions (N, size), with noise, for observations (N, D), which are normalised as by ``PolicyNetwork``, and what the
+        memory holds then, (N, cells).
 
         A spool within its overlap lets nothing through, so that a policy that begins with zeros would have no gradient. The
         mean over noise has one everywhere (randomised smoothing).
         """
         mean, spread = torch.from_numpy(self._mean), torch.from_numpy(np.sqrt(self._variance + EPSILON))
-        actions: Tensor = self._policy(((observation - mean) / spread).clamp(-CLIP, CLIP).float())
+        steps, held = self._policy(((observation - mean) / spread).clamp(-CLIP, CLIP).float()[None], held)
+        actions: Tensor = steps[0]
         if self._noise is None:
-            return actions
+            return actions, held
         drawn = self._noise.standard_normal(actions.shape, dtype=np.float32)
         deviation = self._settings.noise * max(0.0, 1.0 - self.steps / self._settings.steps)
-        return (actions + deviation * torch.from_numpy(drawn)).clamp(-1.0, 1.0)
+        return (actions + deviation * torch.from_numpy(drawn)).clamp(-1.0, 1.0), held
 
     def network(self) -> PolicyNetwork:
         """The policy as plain arrays, a copy."""
-        layers = tuple(
-            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
-            for layer in self._policy
-            if isinstance(layer, torch.nn.Linear)
-        )
-        return PolicyNetwork(self._mean, self._variance, layers, squashed=True)
+        return self._policy.network(self._mean, self._variance)
 
     def save(self, settings: dict[str, Any], past: dict[str, Any]) -> None:
         """Write a checkpoint of these ``settings`` with this ``past``, between two updates."""

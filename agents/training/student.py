@@ -16,12 +16,12 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 
 from agents.policy.files import Policy
-from agents.residual.privileged import with_true_parameters
+from agents.residual.privileged import TRUE_PARAMETERS, with_true_parameters
+from agents.training.differentiated import Differentiated
 from agents.training.validation import TRAINING_SEED, Score, validate
-from baselines.network import PolicyNetwork, Statistics
+from baselines.network import PolicyNetwork
 from birthsim_env.physics.rig.parameters import Parameters
 
 LANES = 256
@@ -49,30 +49,6 @@ class Lessons:
     seed: int = 0
 
 
-class Student(torch.nn.Module):
-    """Normalised observations (T, N, D) -> actions (T, N, size): a tanh layer, a GRU of as many cells, a layer over both."""
-
-    def __init__(self, inputs: int, outputs: int, hidden: int) -> None:
-        super().__init__()
-        self.enter, self.memory = torch.nn.Linear(inputs, hidden), torch.nn.GRU(hidden, hidden)
-        self.leave = torch.nn.Linear(2 * hidden, outputs)
-        torch.nn.init.zeros_(self.leave.weight)
-        torch.nn.init.zeros_(self.leave.bias)
-
-    def forward(self, seen: torch.Tensor, state: torch.Tensor | None = None) -> tuple[torch.Tensor, torch.Tensor]:
-        """Actions, and the state (1, N, hidden) of the memory after them; None begins an episode."""
-        entered = torch.tanh(self.enter(seen))
-        remembered, state = self.memory(entered, state)
-        return self.leave(torch.cat([entered, remembered], -1)), state
-
-    def network(self, mean: Statistics, variance: Statistics) -> PolicyNetwork:
-        """The student as plain arrays, a copy, for observations of this ``mean`` and ``variance`` (D,)."""
-        arrays: dict[str, NDArray[np.float32]] = {name: value.numpy().copy() for name, value in self.state_dict().items()}
-        enter, leave = ((arrays[f"{name}.weight"], arrays[f"{name}.bias"]) for name in ("enter", "leave"))
-        enters, own = ((arrays[f"memory.weight_{kind}_l0"], arrays[f"memory.bias_{kind}_l0"]) for kind in ("ih", "hh"))
-        return PolicyNetwork(mean, variance, (enter, leave), memory=(enters, own))
-
-
 Round = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
 """Normalised observations (T, N, D), the teacher's actions (T, N, size), and whether the episode went on (T, N)."""
 
@@ -80,14 +56,20 @@ Round = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
 def teach(teacher: Policy, lessons: Lessons, parameters: Parameters) -> Iterator[tuple[int, PolicyNetwork, Score]]:
     """Before the first and after each round: policy steps so far, the student as it is, and what it reaches in validation.
 
-    An untaught student is the law alone. ``parameters`` is the rig as its owner describes it.
+    An untaught student is the law alone. ``parameters`` is the rig as its owner describes it. Raises ``ValueError`` for a
+    teacher that was told other parameters than ``true_parameters``.
     """
     torch.set_num_threads(1)
     torch.manual_seed(lessons.seed)
     env, checks = (_worlds(teacher, lanes, parameters) for lanes in (LANES, teacher.training["validation_lanes"]))
     inputs, outputs = env.single_observation_space.shape[0], teacher.network.outputs
+    if teacher.network.inputs != inputs + TRUE_PARAMETERS:
+        raise ValueError(
+            f"teacher observes {teacher.network.inputs} numbers; allowed: {inputs + TRUE_PARAMETERS}, of which "
+            f"{TRUE_PARAMETERS} are the true parameters that this version tells"
+        )
     mean, variance = teacher.network.mean[:inputs], teacher.network.variance[:inputs]
-    student = Student(inputs, outputs, lessons.hidden)
+    student = Differentiated(inputs, outputs, (lessons.hidden,), lessons.hidden, squashed=False)
     adam = torch.optim.Adam(student.parameters(), lr=RATE)
     past: deque[Round] = deque(maxlen=KEPT)
     network = student.network(mean, variance)
@@ -126,16 +108,16 @@ def _round(env: Any, teacher: Policy, network: PolicyNetwork, seed: int, shown: 
     return observations, actions, counted
 
 
-def _learn(student: Student, adam: torch.optim.Optimizer, rounds: list[Round], number: int) -> None:
+def _learn(student: Differentiated, adam: torch.optim.Optimizer, rounds: list[Round], number: int) -> None:
     """The last round and then all of them, four times in the first round and else twice; least squares."""
     order = [len(rounds) - 1, *np.random.default_rng(number).permutation(len(rounds))]
     for k in order * (2 if number else 4):
         observations, actions, counted = rounds[k]
-        state = None
+        held = torch.zeros(observations.shape[1], student.cells)
         for first in range(0, len(observations), CHUNK):
             part = slice(first, first + CHUNK)
-            does, state = student(observations[part], state)
-            state = state.detach()
+            does, held = student(observations[part], held)
+            held = held.detach()
             loss = (((does - actions[part]) ** 2).mean(-1) * counted[part]).mean()
             adam.zero_grad()
             loss.backward()

@@ -32,7 +32,7 @@ def described(rig, names):
 
 def test_every_figure_of_the_rig_that_is_drawn_is_told():
     nominal, ranges = Parameters(), documented_ranges(Parameters())
-    figures = true_parameters(make(randomize="plant")).T[:-6]
+    figures = true_parameters(make(randomize="plant")).T[:-9]
     names = (
         "mechanics.mass", "cylinder1.coulomb_friction", "cylinder2.coulomb_friction", "cylinder1.pressure_friction",
         "cylinder2.pressure_friction", "cylinder1.viscous_friction", "cylinder2.viscous_friction", "friction.bristle_stiffness",
@@ -49,6 +49,22 @@ def test_every_figure_of_the_rig_that_is_drawn_is_told():
         assert low * (1 - 1e-5) <= row.min() < row.max() <= high * (1 + 1e-5), name
         spread = np.log if name == "friction.bristle_stiffness" else np.asarray
         assert np.ptp(spread(row)) > 0.8 * np.ptp(spread([low, high])), name
+
+
+def test_supply_and_bores_are_told_where_a_rig_has_ranges_of_them():
+    drawn = {"air.supply_pressure": 8e5, "cylinder1.piston_diameter": 0.02, "cylinder2.piston_diameter": 0.024}
+    rig = Parameters(ranges=tuple((name, value, value) for name, value in drawn.items()))
+    figures = true_parameters(make(randomize="plant", parameters=rig)).T[-9:-6]
+    # Of bores the square is told, over that of the default 25 mm; the default supply has 7 bar.
+    np.testing.assert_allclose(figures, np.repeat([[8 / 7], [0.64], [0.9216]], LANES, axis=1), rtol=1e-6)
+
+
+def test_what_a_rig_has_none_of_is_told_as_it_is():
+    names = ("coulomb_friction", "viscous_friction", "pressure_friction")
+    rig = Parameters().replace({f"cylinder{k}.{name}": 0.0 for k in (1, 2) for name in names})
+    figures = true_parameters(make(parameters=rig)).T
+    np.testing.assert_array_equal(figures[1:7], 0.0)
+    assert np.isfinite(figures).all()
 
 
 def test_the_errors_of_honest_sensors_are_told():

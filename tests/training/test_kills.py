@@ -58,6 +58,7 @@ SLOW = pytest.mark.slow
 UPDATE = (policy_gradient.PolicyGradient, "_update", 60)
 """Some way beyond the validation half way."""
 SAC = replace(TINY, algorithm="sac", steps=384)
+REMEMBERS = replace(SHORT, memory=5, horizon=4, lanes=16, steps=1024, privileged=True)
 RECURRENT = replace(TINY, algorithm="recurrent-ppo", memory=6)
 LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v2")
 
@@ -74,6 +75,7 @@ LAB = replace(TINY, sensors="lab", environment="BirthSIM/CircleResidual-v2")
         pytest.param(RECURRENT, RESIDUAL, [(*STEP, 70), (*CHECK, 5)], id="recurrent ppo, two deaths"),
         pytest.param(SHORT, PURE, [UPDATE], marks=SLOW, id="apg"),
         pytest.param(BESIDE, INFORMED, [UPDATE], marks=pytest.mark.weekly, id="apg, informed"),
+        pytest.param(REMEMBERS, PURE, [(*UPDATE[:2], 5)], marks=SLOW, id="apg, with a memory"),
     ],
 )
 @pytest.mark.usefixtures("short_probe")

@@ -10,7 +10,6 @@ from agents.reader import teaching
 from agents.reader.rounds import ROWS, collect, truth_of
 from agents.reader.settings import ReaderSettings, is_reader, load_reader_settings, reader_configurations
 from agents.reader.teaching import READER, ROUNDS, teach
-from agents.training.student import Student
 from baselines.estimation.rig_filter import TOLD, spread_of
 from baselines.estimation.rig_reader import INPUTS, READ, load_reader
 from birthsim import train
@@ -65,7 +64,7 @@ def test_the_loss_is_that_of_a_normal_distribution():
 
 def test_an_untaught_reader_says_what_the_filter_finds():
     seen, one = np.random.default_rng(0).normal(size=(2, 3, INPUTS)).astype(np.float32), np.ones(INPUTS)
-    said, unsure = teaching.said_of(Student(INPUTS, 2 * READ, 3), seen, 0.0 * one, one)
+    said, unsure = teaching.said_of(teaching.untaught(3), seen, 0.0 * one, one)
     np.testing.assert_array_equal(said.detach(), seen[:, :, teaching.MEANS])
     np.testing.assert_array_equal(unsure.detach(), seen[:, :, teaching.DEVIATIONS].clip(teaching.LEAST, teaching.MOST))
 

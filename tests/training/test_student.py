@@ -1,6 +1,7 @@
 """A student remembers what its teacher is told: DAgger on a problem whose answer is known, and the command that teaches."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,13 +10,21 @@ import torch
 from agents.policy.files import WEIGHTS, read_policy
 from agents.policy.seeds import best_policy, policy_folders
 from agents.reports.learning_curves import learning_curves
+from agents.residual.privileged import TRUE_PARAMETERS
 from agents.residual.settings import ResidualSettings
 from agents.training import student as module
 from agents.training.configuration import TrainingSettings
-from agents.training.student import Student, _learn
+from agents.training.differentiated import Differentiated
+from agents.training.student import _learn
 from agents.training.trainer import train
 from birthsim.command_line.command import perform_with
 from birthsim.commands import distill
+from birthsim_env.physics.rig.parameters import Parameters
+from tests.residual.policies import INPUTS, policy
+
+
+def made(hidden):
+    return Differentiated(1, 1, (hidden,), hidden, squashed=False)
 
 
 def test_a_student_finds_from_the_past_what_it_is_not_told():
@@ -24,14 +33,14 @@ def test_a_student_finds_from_the_past_what_it_is_not_told():
     levels = torch.randn(64).clamp(-1, 1)
     seen = levels[:, None] + torch.randn(40, 64, 1)
     right = levels.expand(40, 64)[..., None]
-    student = Student(1, 1, 16)
+    student = made(16)
     adam = torch.optim.Adam(student.parameters(), lr=1e-2)
     for number in range(1, 60):
         _learn(student, adam, [(seen, right, torch.ones(40, 64, dtype=torch.bool))], number)
     act = student.network(np.zeros(1), np.ones(1)).acting()
     by_steps = np.stack([act(now) for now in seen.numpy()])
     with torch.no_grad():
-        at_once = student(seen)[0].clamp(-1, 1).numpy()
+        at_once = student(seen, torch.zeros(64, 16))[0].clamp(-1, 1).numpy()
     # Singles in PyTorch, over 40 steps of the memory.
     np.testing.assert_allclose(by_steps, at_once, atol=1e-5)
     error = np.abs(by_steps - right.numpy()).mean(axis=(1, 2))
@@ -41,7 +50,7 @@ def test_a_student_finds_from_the_past_what_it_is_not_told():
 def test_steps_after_a_loss_teach_nothing():
     torch.manual_seed(0)
     seen, right = torch.randn(5, 4, 1), torch.full((5, 4, 1), 100.0)
-    student = Student(1, 1, 4)
+    student = made(4)
     before = [one.clone() for one in student.parameters()]
     _learn(student, torch.optim.SGD(student.parameters(), lr=1.0), [(seen, right, torch.zeros(5, 4, dtype=torch.bool))], 0)
     assert all(torch.equal(one, other) for one, other in zip(before, student.parameters(), strict=True))
@@ -124,6 +133,12 @@ def test_the_same_command_goes_on_with_the_seeds_that_are_not_done(tmp_path, tea
         with pytest.raises(SystemExit):
             told(*command, *change)
     assert taught == [0, 1, 1]
+
+
+def test_a_teacher_that_was_told_other_parameters_is_refused():
+    told = replace(policy(), training={"sensors": "ideal", "randomize": True, "validation_lanes": 2, "privileged": True})
+    with pytest.raises(ValueError, match=rf"teacher observes {INPUTS} numbers; allowed: {INPUTS + TRUE_PARAMETERS}"):
+        next(module.teach(told, module.Lessons(), Parameters()))
 
 
 def test_a_teacher_must_be_told_more(tmp_path, told, capsys):

@@ -245,10 +245,10 @@ def test_a_full_disk_is_said_once_with_the_place_and_without_a_traceback(tmp_pat
     assert train(BRIEF, RESIDUAL, tmp_path)["curve"][-1]["steps"] == BRIEF.steps
 
 
-def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
-    settings = TrainingSettings(
-        "BirthSIM/ProbeResidual-v3", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
-    )
+@pytest.mark.parametrize("algorithm", ["ppo", "apg"])
+def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path, algorithm):
+    few = {"steps": 64, "lanes": 4, "rollout": 8, "batch": 32, "validation_lanes": 4, "validations": 1}
+    settings = TrainingSettings("BirthSIM/ProbeResidual-v3", algorithm=algorithm, privileged=True, **few)
     train(settings, ResidualSettings(), tmp_path)
     policy = read_policy(tmp_path)
     assert policy.training["privileged"] is True

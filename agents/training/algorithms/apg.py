@@ -16,11 +16,14 @@ if TYPE_CHECKING:
 
 @register(algorithm="apg", about="Gradients of the reward through the closed loop.", needs={"extra agents"}, order=50)
 class AnalyticPolicyGradient(Algorithm):
-    """``agents.training.policy_gradient``: ``rollout`` is its horizon."""
+    """``agents.training.policy_gradient``."""
 
-    takes, collects = frozenset({"target", "beside", "noise"}), True
+    takes = frozenset({"target", "beside", "noise", "memory", "privileged", "horizon", "most_cost"})
+    collects = True
 
     def complaint(self, settings: TrainingSettings) -> str:
+        if settings.horizon and settings.rollout % settings.horizon:
+            return f"rollout = {settings.rollout} with horizon = {settings.horizon}; allowed: a multiple of the horizon"
         laws = {one.name: one.made.laws for one in entries("friction")}
         if OPTIONAL not in laws.get(settings.friction, ()):
             return ""
