@@ -7,7 +7,7 @@ are a control period apart; what the filter has found and how sure it is; what t
 For each parameter it says by how much the filter errs and how sure it is itself, in units of the spread of rigs,
     found = mean + spread FAR said,   log(deviation) = log(deviation of the filter) + SURE said.
 A filter takes its errors for new ones at every measurement, but slopes, leaks and laws of friction err alike for seconds. What
-follows from that the network learned. A lane is told what it found, as it weighed what is sure and what is not.
+follows from that the network learned.
 """
 
 import math
@@ -124,9 +124,13 @@ def read(reader: RigReader, filter_: RigFilter, i: int, moved: float, spread: Ar
 
 @helper
 def heed(reader: RigReader, filter_: RigFilter, i: int) -> None:
-    """What lane ``i`` is told: what is read, as far as it is certain."""
+    """What lane ``i`` is told: what is read, as far as the filter or the network is certain.
+
+    The network is the more honest of the two, but what it alone calls certain comes late: the parameters of a filter that errs
+    fit together, so that its lanes are held sooner and more calmly by them than by those described."""
     for a in range(READ):
-        filter_.told[a, i] = certain(reader.mean[a, i], reader.deviation[a, i])
+        unsure = math.sqrt(max(0.0, filter_.covariance[(SIZE + 1) * a, i]))
+        filter_.told[a, i] = certain(reader.mean[a, i], min(unsure, reader.deviation[a, i]))
     filter_.told[INDEX, i] = filter_.mean[INDEX, i]
 
 

@@ -111,8 +111,9 @@ def test_the_loop_says_what_the_network_says():
         )
         unsure = np.exp(law.inputs[:, 2 * len(SUMS) + SIZE :][:, :READ].T + SURE * said[READ:])
         np.testing.assert_allclose(reader.deviation, spread * np.minimum(unsure, 1.0), rtol=1e-4)
-        share = np.clip(2.0 - reader.deviation / CERTAIN, 0.0, 1.0)
-        np.testing.assert_allclose(own.told[:READ], share * reader.mean, rtol=1e-12, atol=1e-15)
+        filtered = np.exp(law.inputs[:, 2 * len(SUMS) + SIZE :][:, :READ].T) * spread
+        share = np.clip(2.0 - np.minimum(reader.deviation, filtered) / CERTAIN, 0.0, 1.0)
+        np.testing.assert_allclose(own.told[:READ], share * reader.mean, rtol=1e-4, atol=1e-5)
     assert readings > 40
 
 

@@ -97,7 +97,13 @@ def _shown(content: Content) -> dict[str, str]:
     return {"wide_rigs.md": f"{said}\n\n{table}\n"}
 
 
-CONTROLLERS = ("backstepping", "admittance-backstepping", "admittance-adaptive", "admittance-adaptive[finds_rig=true]")
+CONTROLLERS = (
+    "backstepping",
+    "admittance-backstepping",
+    "admittance-adaptive",
+    "admittance-adaptive[finds_rig=true]",
+    "admittance-adaptive[reader=wide]",
+)
 
 STUDY = Study(
     {"controller": CONTROLLERS, "episodes": 256, "seed": 993000},
