@@ -93,6 +93,12 @@ GIVEN = {
     "baselines/estimation/friction_observer.py": {"start[0]", "start[1]"},
     "baselines/estimation/hand/bristled_pistons.py": {"pose[5]"},
     "baselines/estimation/stages.py": {"scratch(1)[0, :n]"},
+    "baselines/estimation/rig_reader.py": {
+        "singles(tables, 0)[lane:lane + 1]",
+        "observed[0]",
+        "observed[place + 2 * SIZE + a]",
+        "observed[place + 2 * SIZE + READ]",
+    },
     "birthsim_env/observation.py": {"scales[each * k + each - 1]", "pair[1]", "pair[0]"},
     "baselines/estimation/dry_friction.py": {"pressures[2 * cylinder, i]", "pressures[2 * cylinder + 1, i]"},
     "baselines/identification/windows/tracks.py": {"known[0, i]", "known[1 + k, i]", "flows[4 + k, i]"},
@@ -100,7 +106,7 @@ GIVEN = {
 }
 """Arguments that are one named group of whoever calls: x and y, or chambers P1, N1, P2, N2. In tracks.py: the supply's
 pressure and then those of the tubes' ends; flows from the supply and then those to the atmosphere, (8, N). In corrected.py and
-observation.py: entries of a rail, which begin with cylinder 2. pose, start and _yielding are tuples."""
+observation.py: entries of a rail, which begin with cylinder 2. In rig_reader.py: a lane of a table, and what it sees. pose, start and _yielding are tuples."""
 
 
 def test_kernels_name_their_rows():
