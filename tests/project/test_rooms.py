@@ -106,7 +106,8 @@ GIVEN = {
 }
 """Arguments that are one named group of whoever calls: x and y, or chambers P1, N1, P2, N2. In tracks.py: the supply's
 pressure and then those of the tubes' ends; flows from the supply and then those to the atmosphere, (8, N). In corrected.py and
-observation.py: entries of a rail, which begin with cylinder 2. In rig_reader.py: a lane of a table, and what it sees. pose, start and _yielding are tuples."""
+observation.py: entries of a rail, which begin with cylinder 2. In rig_reader.py: a lane of a table, and what it sees. pose,
+start and _yielding are tuples."""
 
 
 def test_kernels_name_their_rows():
