@@ -21,7 +21,7 @@ from tests.console import ROOT
 
 validate_fmu = imported("fmpy.validation").validate_fmu
 
-FINDING = "admittance-adaptive[finds_rig=true]"
+FINDING = ("admittance-adaptive[finds_rig=true]", "admittance-adaptive[reader=wide]")
 BACKSTEPPING = ("--controller", "backstepping")
 ADAPTIVE = ("--controller", "admittance-adaptive", "--fmi", 3)
 POSITIONS, VELOCITIES = ["measured_x", "measured_y"], ["measured_vx", "measured_vy"]
@@ -74,7 +74,7 @@ def commanded(law, rows, sampled, rig=None):
         ("ideal", "backstepping", BACKSTEPPING),
         ("ideal", "admittance-adaptive", ADAPTIVE),
         ("lab", "residual:circle", ("--policy", "circle", "--sensors", "lab")),
-        ("lab", FINDING, ("--controller", FINDING, "--sensors", "lab")),
+        *(("lab", law, ("--controller", law, "--sensors", "lab")) for law in FINDING),
     ],
 )
 def test_the_openings_are_those_of_python(written, unit, sensors, law, options):
