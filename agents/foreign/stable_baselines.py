@@ -6,7 +6,6 @@ may therefore run code of whoever made it.** Nothing else of it is run here.
 
 import json
 import os
-import pickle
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -147,8 +146,10 @@ def _zero(_: float) -> float:
 def _normalizer(path: Path, length: int) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """``normalize_obs`` of what ``VecNormalize.save`` wrote."""
     allowed = "allowed: a file that save() of VecNormalize wrote"
+    from stable_baselines3.common.save_util import load_from_pkl  # late: it takes seconds
+
     try:
-        statistics = pickle.loads(path.read_bytes())
+        statistics: Any = load_from_pkl(path)
         shape = np.shape(statistics.obs_rms.mean)
         normalize: Callable[[NDArray[Any]], NDArray[Any]] = statistics.normalize_obs
     except OSError as error:

@@ -99,7 +99,7 @@ def _round(settings: ReaderSettings, rig: Parameters, folder: Path, number: int,
     path = make_folder(folder / ROUNDS) / f"{number}.npz"
     if path.is_file():
         try:
-            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw) as file:
                 if (int(file["seed"]), file["truth"].shape) == (seed, (settings.lanes, READ)):
                     return Round(file["seen"], file["truth"], file["alive"])
         except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
@@ -109,7 +109,7 @@ def _round(settings: ReaderSettings, rig: Parameters, folder: Path, number: int,
     tqdm.write(f"round {number + 1} of {settings.rounds}: {settings.lanes} episodes") if not position else None
     made = collect(settings, rig, number, seed)
     with whole_file(path) as file:
-        np.savez(file, allow_pickle=False, seed=seed, seen=made.seen, truth=made.truth, alive=made.alive)
+        np.savez(file, seed=seed, seen=made.seen, truth=made.truth, alive=made.alive)
     return made
 
 

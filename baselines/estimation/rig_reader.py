@@ -159,8 +159,9 @@ def save_reader(network: PolicyNetwork, path: Path) -> None:
     """Write a reader's file, which appears whole or not at all."""
     (enter, leave), (enters, own) = network.layers, network.memory
     arrays: tuple[NDArray[Any], ...] = (network.mean, network.variance, *enter, *leave, *enters, *own)
+    content: dict[str, Any] = dict(zip(NETWORK + MEMORY, arrays, strict=True))
     with whole_file(path) as file:
-        np.savez(file, allow_pickle=False, **dict(zip(NETWORK + MEMORY, arrays, strict=True)))
+        np.savez(file, **content)
 
 
 def load_reader(name: str | Path | PolicyNetwork) -> PolicyNetwork:
@@ -174,7 +175,7 @@ def load_reader(name: str | Path | PolicyNetwork) -> PolicyNetwork:
     if not path.is_file():
         raise ValueError(f"reader = {named(path)} is no file{near(str(name), reader_names())}; {allowed}")
     try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw) as file:
             mean, variance, *arrays = (file[key] for key in NETWORK + MEMORY)
         pairs = tuple(zip(arrays[::2], arrays[1::2], strict=True))
         network = PolicyNetwork(mean, variance, pairs[:2], memory=pairs[2:])
