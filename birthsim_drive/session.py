@@ -246,6 +246,9 @@ def _rig_of(drive: Drive, place: Path) -> Iterator[tuple[str, Event]]:
 
 def _started(target: Callable[..., None], *arguments: Any) -> BaseProcess:
     """A process of its own, which shares nothing with this one."""
+    if multiprocessing.get_start_method() not in multiprocessing.get_all_start_methods():
+        # A worker of joblib names a way of its own, which its children do not know.
+        multiprocessing.set_start_method("spawn", force=True)
     process = _APART.Process(target=target, args=arguments, daemon=True)
     process.start()
     return process

@@ -114,5 +114,6 @@ STUDY = Study(
     {"periods": "s", "jitter": "s", "computing": "s"},
     _shown,
     words={"seconds": "of each drive", "others": "processes that are busy"},
+    timed=True,
 )
 register(study="drive-timing", about="how punctual drive is, quiet and beside busy processes")(STUDY)
