@@ -2,7 +2,7 @@
 
 Let t be the truth, m and s what is said of it, all logarithms over what is described in units of the spread of rigs. Then the
 loss of a reading is (t - m)^2/(2 s^2) + log s, its mean over parameters, readings and lanes (a normal distribution's). Rounds
-are kept in the folder, so that a teaching that was interrupted goes on, and ends with the same reader.
+are kept in the folder, some 30 MB each, so that a teaching that was interrupted goes on, and ends with the same reader.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from agents.reader.settings import ReaderSettings
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.differentiated import Differentiated
 from agents.training.validation import TRAINING_SEED, VALIDATION_SEED
+from baselines.estimation.readers import save_reader
 from baselines.estimation.rig_filter import EVERY, SETTLING, SIZE, TOLD, spread_of
-from baselines.estimation.rig_reader import FAR, INPUTS, READ, SUMS, SURE, save_reader
+from baselines.estimation.rig_reader import FAR, INPUTS, READ, SUMS, SURE
 from baselines.network import CLIP, EPSILON, PolicyNetwork
 from birthsim_env.files import make_folder, whole_file
 from birthsim_env.physics.rig.parameters import Parameters

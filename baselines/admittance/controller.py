@@ -16,14 +16,16 @@ import numpy as np
 
 from baselines.admittance import belief, estimator, law
 from baselines.admittance.belief import Belief
+from baselines.admittance.believable import require_believable
 from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, checked_gains, require_stiffness
 from baselines.estimation import friction_observer, inertial, rig_filter, rig_reader
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.hand import friction_candidates
+from baselines.estimation.readers import reader_of
 from baselines.estimation.rig_filter import RigFilter
-from baselines.estimation.rig_reader import RigReader, load_reader
+from baselines.estimation.rig_reader import RigReader
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.network import PolicyNetwork
 from baselines.staged import ControllerStage, StagedController
@@ -32,8 +34,7 @@ from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETERS, Array, parameter_array
-from birthsim_env.physics.rig.parameters import DECLARED, Parameters, value_of
-from birthsim_env.physics.rig.rows import plant_parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import near, shown
 from birthsim_env.registry import register
 
@@ -172,7 +173,7 @@ class AdmittanceController(StagedController):
         check_flags({**flags, "finds_rig": finds_rig})
         if identified and force_sensor:
             raise ValueError(f"identified = {identified!r} with a force sensor; allowed: only where force_sensor is False")
-        self._reader = load_reader(reader) if isinstance(reader, PolicyNetwork) or reader != "" else None
+        self._reader = reader_of(reader)
         finds_rig = bool(finds_rig) or self._reader is not None
         if finds_rig and not force_sensor:
             raise ValueError(f"finds_rig = {finds_rig!r} without a force sensor; allowed: only where force_sensor is True")
@@ -225,7 +226,7 @@ class AdmittanceController(StagedController):
         if not rigs or not all(isinstance(one, Parameters) for one in rigs):
             raise ValueError(f"rig = {shown(rig)}; allowed: a Parameters, or a sequence with one for each lane that is told")
         for one in rigs:
-            self._require_believable(one)
+            require_believable(one, self.parameters)
         known = self._told.shape[1] or self._lanes
         if lanes is None:
             lanes = np.ones(known or len(rigs), dtype=np.bool_)
@@ -283,13 +284,6 @@ class AdmittanceController(StagedController):
     def rows_of_law(self) -> int:
         """What the law remembers of a lane with its belief: so many rows stand before what finds the rig."""
         return self._rows + Belief.size
-
-    def _require_believable(self, rig: Parameters) -> None:
-        own = self.parameters
-        for name in DECLARED:
-            its, mine = value_of(rig, name), value_of(own, name)
-            if its != mine and (name not in plant_parameters() or DECLARED[name].option or DECLARED[name].choices):
-                raise ValueError(f"rig: {name} = {its!r}; allowed: {mine!r}, as the controller was made with")
 
     def _beliefs(self) -> Belief:
         return Belief(self._memories[-1][self._rows :][: Belief.size])

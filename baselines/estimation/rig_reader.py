@@ -11,8 +11,6 @@ follows from that the network learned.
 """
 
 import math
-import zipfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,15 +33,12 @@ from baselines.estimation.rig_filter import (
     spread_of,
 )
 from baselines.network import PolicyNetwork, answer
-from birthsim_env.files import whole_file
 from birthsim_env.loop.stage import TABLE, singles, table3
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.rig.parameters import Parameters, value_of
-from birthsim_env.physics.rig.reading import named
-from birthsim_env.physics.rig.values import near, problem
 
 READ = len(TOLD)
 """Parameters that are read: all but the index of chambers."""
@@ -69,13 +64,6 @@ LAYERS = 2
 
 FIRST_TABLE = 2
 """Tables: what is seen (N, INPUTS), ``PolicyNetwork.room``, and from here on ``PolicyNetwork.tables``."""
-
-READERS = Path(__file__).resolve().parent / "readers"
-"""Networks that come with the package."""
-
-NETWORK = ("mean", "variance", "enter.weight", "enter.bias", "leave.weight", "leave.bias")
-MEMORY = ("enters.weight", "enters.bias", "own.weight", "own.bias")
-"""Arrays in a reader's file: those of the network, and those of its memory."""
 
 
 class RigReader(Rows):
@@ -148,45 +136,3 @@ def found(reader: RigReader, rig: Parameters) -> dict[str, tuple[Array, Array]]:
 def tables(network: PolicyNetwork, lanes: int) -> tuple[Any, ...]:
     """What ``read`` needs for so many lanes."""
     return np.zeros((lanes, INPUTS), dtype=np.float32), network.room(lanes), *network.tables
-
-
-def reader_names() -> list[str]:
-    """Readers that come with the package."""
-    return sorted(path.stem for path in READERS.glob("*.npz"))
-
-
-def save_reader(network: PolicyNetwork, path: Path) -> None:
-    """Write a reader's file, which appears whole or not at all."""
-    (enter, leave), (enters, own) = network.layers, network.memory
-    arrays: tuple[NDArray[Any], ...] = (network.mean, network.variance, *enter, *leave, *enters, *own)
-    content: dict[str, Any] = dict(zip(NETWORK + MEMORY, arrays, strict=True))
-    with whole_file(path) as file:
-        np.savez(file, **content)
-
-
-def load_reader(name: str | Path | PolicyNetwork) -> PolicyNetwork:
-    """The network of a reader by name, or of a reader's file; a network is itself. Nothing is unpickled.
-
-    Raises ``ValueError`` for a name that is unknown, and a file that is damaged or of another network."""
-    if isinstance(name, PolicyNetwork):
-        return require_reader(name, "reader")
-    path = READERS / f"{name}.npz" if str(name) in reader_names() else Path(name)
-    allowed = f"allowed: {', '.join([*reader_names(), 'a file reader.npz that birthsim train wrote'])}"
-    if not path.is_file():
-        raise ValueError(f"reader = {named(path)} is no file{near(str(name), reader_names())}; {allowed}")
-    try:
-        with path.open("rb") as raw, np.load(raw) as file:
-            mean, variance, *arrays = (file[key] for key in NETWORK + MEMORY)
-        pairs = tuple(zip(arrays[::2], arrays[1::2], strict=True))
-        network = PolicyNetwork(mean, variance, pairs[:2], memory=pairs[2:])
-    except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(f"reader = {str(path)!r} is damaged ({problem(error)}); {allowed}") from error
-    return require_reader(network, f"reader = {str(path)!r}")
-
-
-def require_reader(network: PolicyNetwork, name: str) -> PolicyNetwork:
-    """The network; ``ValueError`` where it is none that reads a rig."""
-    if (network.inputs, network.outputs, len(network.layers)) != (INPUTS, 2 * READ, LAYERS) or not network.memory:
-        shape = f"{network.inputs} to {network.outputs} numbers by {len(network.layers)} layers, {network.cells} cells"
-        raise ValueError(f"{name} maps {shape}; allowed: {INPUTS} to {2 * READ} by {LAYERS}, with a memory")
-    return network

@@ -11,8 +11,9 @@ from agents.reader.rounds import Watched, blank
 from baselines.admittance.controller import AdmittanceController
 from baselines.driving import driving
 from baselines.estimation import rig_filter, rig_reader
+from baselines.estimation.readers import load_reader, reader_names, save_reader
 from baselines.estimation.rig_filter import CERTAIN, EVERY, REACH, SIZE, TOLD, RigFilter, spread_of
-from baselines.estimation.rig_reader import FAR, INPUTS, READ, SUMS, SURE, RigReader, load_reader, reader_names, save_reader
+from baselines.estimation.rig_reader import FAR, INPUTS, READ, SUMS, SURE, RigReader
 from baselines.named import make_controller
 from baselines.network import PolicyNetwork
 from birthsim_env.physics.rig.parameters import Parameters, value_of
@@ -122,7 +123,6 @@ def openings(law: AdmittanceController, lanes: int) -> list[Any]:
 
 
 def test_a_reader_that_corrects_nothing_tells_what_the_filter_finds():
-    """To rounding: what it says of its deviation goes through a logarithm."""
     filtered, read = AdmittanceController(finds_rig=True), AdmittanceController(reader=blank())
     for own, others in zip(openings(filtered, 4), openings(read, 4), strict=True):
         np.testing.assert_allclose(own, others, rtol=1e-6, atol=1e-9)
@@ -171,6 +171,9 @@ def test_what_is_no_reader_is_refused(tmp_path):
     for name in ("widee", str(tmp_path)):
         with pytest.raises(ValueError, match=r"reader = .* is no file.*allowed: .*reader\.npz"):
             AdmittanceController(reader=name)
+    for value in (5.0, True, None):
+        with pytest.raises(ValueError, match=rf"reader = {value}; allowed: a name, a file's path, or a network"):
+            AdmittanceController(reader=value)
     with pytest.raises(ValueError, match=rf"reader maps 3 to 2 .*allowed: {INPUTS} to {2 * READ} by 2, with a memory"):
         AdmittanceController(reader=another_network())
     with pytest.raises(ValueError, match=r"without a force sensor; allowed: .*force_sensor is True"):

@@ -10,8 +10,9 @@ from agents.reader import teaching
 from agents.reader.rounds import ROWS, collect, truth_of
 from agents.reader.settings import ReaderSettings, is_reader, load_reader_settings, reader_configurations
 from agents.reader.teaching import READER, ROUNDS, teach
+from baselines.estimation.readers import load_reader
 from baselines.estimation.rig_filter import TOLD, spread_of
-from baselines.estimation.rig_reader import INPUTS, READ, load_reader
+from baselines.estimation.rig_reader import INPUTS, READ
 from birthsim import train
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters, value_of
