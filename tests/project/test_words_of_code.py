@@ -42,5 +42,5 @@ def test_nothing_promises_an_index_that_has_no_birthsim():
         text=True,
         check=False,
     ).stdout.splitlines()
-    past = ("CHANGELOG.md", "docs/data/installed.md", "lab/studies/installed.py", "tests/project/test_words_of_code.py")
+    past = ("CHANGELOG.md", "docs/data/installed.md", "lab/studies/installed/study.py", "tests/project/test_words_of_code.py")
     assert [line for line in told if not line.startswith(past)] == []
