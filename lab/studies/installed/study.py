@@ -31,6 +31,9 @@ PATIENCE = 120.0
 INTERRUPTED = 128 + signal.SIGINT
 """The exit status of a command that Ctrl-C ends in order; a program without an order of its own dies of the signal."""
 
+INSTALLATION = 3600.0
+"""s that the installation may take; assumed."""
+
 PORT = 8765
 """Of the page, where ``birthsim live`` gets one; assumed to be free."""
 
@@ -118,7 +121,7 @@ def trial(extras: str, longest: float) -> Result:
         subprocess.run([sys.executable, "-m", "venv", str(folder / "venv")], check=True)
         trial = Trial(folder, longest)
         install = ["pip", "install", "-c", str(ROOT / "constraints.txt"), f"{wheel}[{extras}]"]
-        trial.step("", install, folder, 10 * longest)
+        trial.step("", install, folder, INSTALLATION)
         trial.step("", ["birthsim", "doctor"], folder)
         for page in pages():
             trial.page(page)
