@@ -36,8 +36,8 @@ FINDS_RIG = "admittance[finds_rig=true]"
 
 _CAPTION = (
     "Settled errors, geometric mean over the feasible ones of {measured}, in brackets the 95 % interval over episodes. The "
-    "best controller was chosen among all classical ones by {chosen}. *One point* is the factor of errors that one point of score "
-    "stands for."
+    "best controller was chosen among all classical ones by {chosen}. *One point* is the factor between the "
+    "errors of two scores that differ by one point."
 )
 
 
