@@ -56,4 +56,6 @@ def main(settings: Settings) -> None:
     own = plan(settings.policy, *world, settings.policy_period, settings.normalize, settings.name)
     warn_of_worlds(settings.policy, seed, settings.episodes)
     scored = judge(own, settings.out, settings.jobs, settings.cluster, True)
+    if not all(task.is_scored for task in own.tasks):
+        print("no score: only tasks of the suites have a scale")
     print(f"{scored}\n\nwritten to {settings.out}/: {NAME}")

@@ -102,8 +102,12 @@ def test_every_task_has_a_scale_of_which_a_point_resolves_a_tenth_of_an_error(ta
     assert find_task(task).is_scored
 
 
-def test_a_task_of_no_suite_has_success_and_errors_but_no_score():
-    row = birthsim.score("pid", "BirthSIM/Rail-v1", episodes=2, progress=False).row
+def test_a_task_of_no_suite_has_success_and_errors_but_no_score(tmp_path, monkeypatch, capsys):
+    given = ("pid", "--env", "BirthSIM/Rail-v1", "--episodes", 2, "--jobs", 1, "--out", tmp_path / "out")
+    status, printed, complained = call("score", monkeypatch, capsys, *given)
+    assert status == 0, complained
+    assert "no score: only tasks of the suites have a scale" in printed
+    row = strict(tmp_path / "out" / "score.json")
     (one,) = row["tasks"]
     assert (one["score"], one["scores"], row["overall"]) == (None, None, None)
     assert one["success"]["value"] is not None
