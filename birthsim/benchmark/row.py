@@ -42,7 +42,7 @@ def task_row(task: BenchmarkTask, runs: Sequence[Result]) -> dict[str, Any]:
         "options": task.options,
         "episodes": len(feasible),
         "infeasible": np.flatnonzero(~feasible).tolist(),
-        "errors": [[None if np.isnan(error) else error for error in run] for run in jsonable(each.tolist())],
+        "errors": [[None if np.isnan(error) else jsonable(float(error)) for error in run] for run in each],
     }
     scores = scores_of(row)
     any_feasible = bool(feasible.any())

@@ -34,6 +34,12 @@ def test_every_entry_keeps_the_rules(path):
     assert entries.against_rules(entries.entry(path), path) == ""
 
 
+def test_the_projects_own_entries_are_those_that_it_declares():
+    for name, (policy, tasks) in entries.own_entries().items():
+        said = entries.entry(entries.ENTRIES / f"{name}.json")
+        assert (said["entry"], said["given"], repeat.tasks_of(said)) == (name, [policy], tasks)
+
+
 def test_there_is_what_the_benchmark_promises(known):
     learned = [name for name, said in known.items() if len(said["kinds"]) == 5 and "controller" not in said["kinds"]]
     assert len(known) >= 12

@@ -6,6 +6,8 @@ ONNX, or what ``birthsim train`` wrote. Those hold data, so that nothing of an e
 
 import os
 import re
+import tomllib
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,9 @@ from birthsim_env.registry import names
 from birthsim_env.splits import TEST
 
 ENTRIES = ROOT / "lab" / "leaderboard"
+OWN = ENTRIES / "own.toml"
+"""The project's own entries, which are made from there."""
+
 RULES: dict[str, Any] = {"format": FORMAT, "split": TEST.name, "seed": TEST.first, "episodes": 64}
 """What every entry has."""
 
@@ -53,6 +58,14 @@ _REGISTERED = re.compile(r"(limited:)?[a-z][\w-]*(\[[\w.,=+-]+\])?")
 def entries() -> list[Path]:
     """The files of the entries."""
     return sorted(ENTRIES.glob("*.json"))
+
+
+def own_entries() -> dict[str, tuple[str, list[str]]]:
+    """Name -> policy and tasks of each entry that the project makes itself."""
+    return {
+        name: (own["policy"], [task for task in TASKS if any(fnmatch(task, pattern) for pattern in own.get("tasks", ["*"]))])
+        for name, own in tomllib.loads(OWN.read_text(encoding="utf-8")).items()
+    }
 
 
 def entry(path: Path) -> dict[str, Any]:

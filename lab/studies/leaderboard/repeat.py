@@ -15,7 +15,7 @@ from birthsim_env.physics.rig.values import near, shown
 from birthsim_env.registry import register
 from lab.engine.results import written
 from lab.engine.shelf import DATA
-from lab.studies.leaderboard.entries import RULES, against_rules, entries, entry, policies_of
+from lab.studies.leaderboard.entries import ENTRIES, RULES, against_rules, entries, entry, own_entries, policies_of
 from lab.studies.leaderboard.tables import texts
 
 UNLIKE = ("seconds", "versions")
@@ -26,7 +26,7 @@ UNLIKE = ("seconds", "versions")
 class Settings(Processes):
     """Run entries of lab/leaderboard again, say which repeats in every bit, and write the tables of docs/leaderboard.md.
 
-    With --renew what is found takes the place of an entry.
+    With --renew what is found takes the place of an entry, and those of own.toml are made where they are missing.
     """
 
     entries: Annotated[list[str] | None, MANY, Parameter(metavar="NAME...")] = None
@@ -55,6 +55,8 @@ def _chosen(settings: Settings) -> list[Path]:
     if settings.renew and settings.episodes != RULES["episodes"]:
         raise ValueError(f"--episodes {settings.episodes} with --renew; allowed: {RULES['episodes']}")
     known = {path.stem: path for path in entries()}
+    if settings.renew:
+        known |= {name: ENTRIES / f"{name}.json" for name in own_entries()}
     for name in settings.entries or ():
         if name not in known:
             raise ValueError(f"--entries {shown(name)}{near(name, known)}; allowed: {', '.join(known)}")
@@ -71,10 +73,14 @@ def _problem(path: Path, settings: Settings) -> str:
 
 def renewed(path: Path, jobs: int = 1) -> str:
     """What of an entry the rules do not allow; "" where it was run and written anew."""
-    said = entry(path)
-    if broken := against_rules(said, path):
+    own = own_entries().get(path.stem)
+    if own is not None:
+        row = found([own[0]], own[1], path.stem, jobs=jobs)
+    elif broken := against_rules(said := entry(path), path):
         return broken
-    write_text(path, written(found(said, path, RULES["episodes"], jobs)))
+    else:
+        row = found(policies_of(said, path), tasks_of(said), said["entry"], said["policy_period"][0], jobs=jobs)
+    write_text(path, written(row))
     return ""
 
 
@@ -86,7 +92,7 @@ def problem(path: Path, episodes: int = RULES["episodes"], jobs: int = 1) -> str
     said = entry(path)
     if broken := against_rules(said, path):
         return broken
-    again = found(said, path, episodes, jobs)
+    again = found(policies_of(said, path), tasks_of(said), said["entry"], said["policy_period"][0], episodes, jobs)
     if episodes < RULES["episodes"]:
         pairs = [("sha256", said.get("sha256"), again["sha256"])]
         for one, own in zip(said["tasks"], again["tasks"], strict=True):
@@ -97,11 +103,16 @@ def problem(path: Path, episodes: int = RULES["episodes"], jobs: int = 1) -> str
     return f"other {' and '.join(differs)} here" if differs else ""
 
 
-def found(said: dict[str, Any], path: Path, episodes: int, jobs: int) -> dict[str, Any]:
-    """The row of an entry that keeps the rules, as it is found now."""
-    tasks = [one["task"] for one in said["tasks"]]
-    where = (None, SENSORS, True, None, tasks, episodes, RULES["seed"], said["policy_period"][0])
-    own = plan(policies_of(said, path), *where, None, said["entry"])
+def tasks_of(said: dict[str, Any]) -> list[str]:
+    """Names of an entry's tasks."""
+    return [one["task"] for one in said["tasks"]]
+
+
+def found(
+    policies: list[str], tasks: list[str], name: str, period: float = 0.01, episodes: int = RULES["episodes"], jobs: int = 1
+) -> dict[str, Any]:
+    """The row of an entry as it is found now."""
+    own = plan(policies, None, SENSORS, True, None, tasks, episodes, RULES["seed"], period, None, name)
     with tempfile.TemporaryDirectory() as folder:
         judge(own, Path(folder), jobs, None, True)
         row: dict[str, Any] = json.loads((Path(folder) / NAME).read_text(encoding="utf-8"))
