@@ -82,9 +82,9 @@ def test_generated_parts_know_everything(parts):
     commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
     ids = [name for name in environment_ids() if "Residual" not in name]
     fields = [name for section in Parameters().to_dict().values() for name in section]
-    named = [*ids, *names("sensors"), *names("hand")]
     for part, known in (
-        *(("commands.md", commands), ("environments.md", named), ("metrics.md", UNITS), ("rig.md", fields)),
+        *(("commands.md", commands), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)),
+        *(("sensors.md", names("sensors")), ("hands.md", names("hand")), ("frictions.md", names("friction"))),
         ("readers.md", names("reader")),
     ):
         assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
@@ -186,7 +186,7 @@ NOTEBOOKS = [page for page, text in PAGES.items() if "{code-cell}" in text]
 BRIEF = ("tutorials/first_episode",)
 """Notebooks that a commit runs; the others weekly."""
 
-LARGE = ("comparison", "reference/environments", "reference/commands")
+LARGE = ("comparison", "environments/index", "environments/circle", "reference/commands")
 """Pages of which each takes axe half a minute."""
 
 
