@@ -104,7 +104,7 @@ run: $(BASE)
 	$(BIN)/birthsim train --config circle_apg --steps 300000 --seed 0 --out $(OUT)/scratch
 	@echo "== 4 of 4: the paper's controller, the best one, the controller from scratch and the residual on 64 episodes that training never saw"
 	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual:$(OUT)/scratch residual --policy $(OUT)/policy \
-	  --episodes 64 --seed 10000 --out $(OUT)/evaluation
+	  --episodes 64 --seed test --out $(OUT)/evaluation
 	@echo "== What to try next"
 	@echo "$(BIN)/birthsim live                                       the rig in the browser, to be pulled with the mouse"
 	@echo "$(BIN)/birthsim evaluate --controller backstepping examples/pd.py:PD --out $(OUT)/mine    a controller of your own"
