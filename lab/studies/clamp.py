@@ -129,7 +129,7 @@ def _shown(content: Content) -> dict[str, str]:
         "Cells: force that the hand feels, N peak to peak, in the last 2 s of 5, median and 95th percentile, by the hand's "
         f"stiffness and damping; what it is pressed with on average, and air, in that of {clamp}. {information.LEGEND}"
     )
-    sweep = "[sweep](explanation/friction.md#is-it-the-friction-that-controllers-expect)"
+    sweep = "[sweep](../explanation/friction.md#is-it-the-friction-that-controllers-expect)"
     other = f"In the hand of {clamp}, frictions of the {sweep}:"
     return {"clamp.md": f"{said}\n\n{markdown(whole)}\n\n{other}\n\n{markdown(frictions)}\n"}
 

@@ -138,7 +138,7 @@ def tables(content: Content, name: str) -> dict[str, str]:
         f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad. {LEGEND}",
         overview(figures), *([losses(figures)] if several else []),
         "Every metric, with its interval, its worst episode and its ratio to that of the paper's controller: "
-        f"[{name}.csv](data/{name}.csv)",
+        f"[{name}.csv](../data/{name}.csv)",
     ]  # fmt: skip
     return {f"{name}.md": "\n\n".join(parts) + "\n", f"{name}.csv": data(figures)}
 
