@@ -49,7 +49,8 @@ def readers(page):
     """The folders from which a page's links lead: for a table, those of the pages that include it."""
     if page.parent.name != "data":
         return {page.parent}
-    return {other.parent for other, text in TEXTS.items() if re.search(rf"\{{include\}} [./]*data/{page.name}$", text, re.MULTILINE)}
+    included = re.compile(rf"\{{include\}} [./]*data/{page.name}$", re.MULTILINE)
+    return {other.parent for other, text in TEXTS.items() if included.search(text)}
 
 
 def test_linked_files_exist():

@@ -61,7 +61,7 @@ def bandwidth(controller: str, sensors: str, push: str, axis: str, column: str =
 
 
 def test_what_pages_say_in_words_of_bandwidths_holds() -> None:
-    """They round; this fails when a renewed result leaves what the words mean (docs/explanation/hand.md, docs/laboratory/bandwidth.md)."""
+    """Words round: this fails when a renewed result leaves what docs/explanation/hand.md and laboratory/bandwidth.md say."""
     adaptive, several = "admittance-adaptive", (3.0, 10.0)
     assert several[0] < bandwidth(adaptive, "ideal", "10 N", "x") < several[1]
     assert bandwidth(adaptive, "honest", "10 N", "x") < 1.0
@@ -73,7 +73,7 @@ def test_what_pages_say_in_words_of_bandwidths_holds() -> None:
 
 
 def test_a_stiff_hand_makes_most_controllers_tremble_and_the_best_one_little() -> None:
-    """README, docs/laboratory/stiff_hand.md and docs/limits.md: more than 10 N, and of the best one less than 5 N, 12 N at 95 %."""
+    """README, laboratory/stiff_hand.md, limits.md: more than 10 N, and of the best one less than 5 N, 12 N at 95 %."""
     held = [one for one in read_result("clamp")["figures"] if (one["stiffness"], one["damping"]) == (2e4, 60.0)]
     drawn = [one for one in held if one["friction"] == "lugre-drawn" and one["rig"] == "default"]
     best = [one["force"] for one in drawn if one["controller"] == "admittance-adaptive"]
