@@ -176,7 +176,7 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.csv")}
     columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
     text = "".join([*PAGES.values(), *TABLES.values()])
-    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((data/[^)]+)\)", text)}
+    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((?:\.\./)?(data/[^)]+)\)", text)}
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
     others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
     assert columns == compared | others
@@ -186,7 +186,7 @@ NOTEBOOKS = [page for page, text in PAGES.items() if "{code-cell}" in text]
 BRIEF = ("tutorials/first_episode",)
 """Notebooks that a commit runs; the others weekly."""
 
-LARGE = ("comparison", "reference/environments", "reference/commands")
+LARGE = ("laboratory/comparison", "reference/environments", "reference/commands")
 """Pages of which each takes axe half a minute."""
 
 
