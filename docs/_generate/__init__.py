@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from _generate.api import api
-from _generate.benchmark import splits, suites
+from _generate.benchmark import records, splits, suites
 from _generate.commands import commands
 from _generate.controllers import controllers
 from _generate.drives import faults, provoked
@@ -37,6 +37,7 @@ PARTS = {
     "provoked.md": provoked,
     "readers.md": readers,
     "rig.md": rig,
+    **records(),
     "splits.md": splits,
     "suites.md": suites,
     **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},
