@@ -22,6 +22,9 @@ KEPT = {"returns": FLOATS, "lengths": Kept(0, whole=True)}
 """What a state has of the episodes so far."""
 
 
+SET_RANGES = "set_ranges"
+"""What Stable-Baselines3 may call, of all lanes together."""
+
 LANE_ATTRIBUTES: dict[str, Callable[[Any, int], Any]] = {
     "action_space": lambda env, _: env.single_action_space,
     "observation_space": lambda env, _: env.single_observation_space,
@@ -122,10 +125,24 @@ class SB3VecEnv(VecEnv):
         return [getattr(self.env, attr_name)] * len(lanes)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        raise NotImplementedError(f"set_attr({attr_name!r}): the lanes share one environment; make it with other arguments")
+        raise NotImplementedError(
+            f"set_attr({attr_name!r}): the lanes share one environment; make it with other arguments, or call "
+            f"env_method({SET_RANGES!r}, ...)"
+        )
 
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
-        raise NotImplementedError(f"env_method({method_name!r}): the lanes share one environment; call it on .env")
+        """``env_method("set_ranges", randomize)``: what all lanes draw from their next episodes on.
+
+        Raises ``NotImplementedError`` for other methods and for some of the lanes.
+        """
+        lanes = list(self._get_indices(indices))
+        if method_name != SET_RANGES or len({*lanes}) < self.num_envs:
+            raise NotImplementedError(
+                f"env_method({method_name!r}) of {len(lanes)} lanes: the lanes share one environment; allowed: "
+                f"{SET_RANGES!r} of all {self.num_envs}; call others on .env"
+            )
+        self.env.unwrapped.set_ranges(*method_args, **method_kwargs)
+        return [None] * len(lanes)
 
     def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
         return [False] * len(list(self._get_indices(indices)))
