@@ -28,8 +28,8 @@ SET_RANGES = "set_ranges"
 LANE_ATTRIBUTES: dict[str, Callable[[Any, int], Any]] = {
     "action_space": lambda env, _: env.single_action_space,
     "observation_space": lambda env, _: env.single_observation_space,
-    "measurement": lambda env, lane: measurement_of(env.measurement, lane),
-    "reference": lambda env, lane: Reference(env.reference.rows[:, lane]),
+    "measurement": lambda env, lane: measurement_of(env.unwrapped.measurement, lane),
+    "reference": lambda env, lane: Reference(env.unwrapped.reference.rows[:, lane]),
     "scene": lambda env, lane: env.unwrapped.scene_of(lane),
 }
 """What differs from lane to lane, or is another thing of one lane than of all."""
@@ -41,7 +41,8 @@ def _shared(info: dict[str, Any]) -> dict[str, Any]:
 
 
 class SB3VecEnv(VecEnv):
-    """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
+    """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3, also in wrappers
+    of Gymnasium that work with that mode (docs/how-to/wrappers.md).
 
     ``infos[i]`` has what a single environment tells, such as ``cost``. When the episode of lane i ends, ``infos[i]["episode"]``
     has its return and length besides, and ``infos[i]["terminal_observation"]`` its last observation, as with
@@ -99,8 +100,8 @@ class SB3VecEnv(VecEnv):
         return observation, rewards.astype(np.float32), ended, infos
 
     def get_state(self) -> State:
-        """``env.get_state()``, and with it the returns and lengths of the episodes so far."""
-        return {**self.env.get_state(), "returns": self._returns.copy(), "lengths": self._lengths.copy()}
+        """``get_state()`` of the environment, which knows of no wrapper, and the returns and lengths of the episodes so far."""
+        return {**self.env.unwrapped.get_state(), "returns": self._returns.copy(), "lengths": self._lengths.copy()}
 
     def set_state(self, state: State) -> None:
         """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
@@ -108,7 +109,7 @@ class SB3VecEnv(VecEnv):
         for name, array in own.items():
             if complaint := KEPT[name].complaint(array, state.get(name), np.inf):
                 raise ValueError(f"state: {name!r} {complaint}")
-        self.env.set_state({name: value for name, value in state.items() if name not in own})
+        self.env.unwrapped.set_state({name: value for name, value in state.items() if name not in own})
         for name, array in own.items():
             array[:] = state[name]
 
@@ -122,7 +123,7 @@ class SB3VecEnv(VecEnv):
         lanes = list(self._get_indices(indices))
         if attr_name in LANE_ATTRIBUTES:
             return [LANE_ATTRIBUTES[attr_name](self.env, lane) for lane in lanes]
-        return [getattr(self.env, attr_name)] * len(lanes)
+        return [getattr(self.env if hasattr(self.env, attr_name) else self.env.unwrapped, attr_name)] * len(lanes)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         raise NotImplementedError(
