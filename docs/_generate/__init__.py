@@ -8,7 +8,8 @@ from pathlib import Path
 
 from _generate.api import api
 from _generate.benchmark import records, splits, suites
-from _generate.commands import commands
+from _generate.commands import commands, readers
+from _generate.configurations import configurations
 from _generate.controllers import controllers
 from _generate.drives import faults, provoked
 from _generate.environments import environments
@@ -16,7 +17,6 @@ from _generate.metrics import metrics
 from _generate.page import page
 from _generate.pictures import pictures
 from _generate.pipeline import pipeline
-from _generate.readers import readers
 from _generate.rig import options, rig
 from _generate.root_pages import PAGES, root_page
 from _generate.stages import stage
@@ -27,6 +27,7 @@ PARTS = {
     "api_baselines.md": partial(api, "baselines"),
     "api_agents.md": partial(api, "agents"),
     "commands.md": commands,
+    "configurations.md": configurations,
     "controllers.md": controllers,
     "environments.md": environments,
     "faults.md": faults,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from agents.training.configuration import configuration_names
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
 from birthsim.main import COMMANDS
@@ -85,7 +86,7 @@ def test_generated_parts_know_everything(parts):
     named = [*ids, *names("sensors"), *names("hand")]
     for part, known in (
         *(("commands.md", commands), ("environments.md", named), ("metrics.md", UNITS), ("rig.md", fields)),
-        ("readers.md", names("reader")),
+        *(("readers.md", names("reader")), ("configurations.md", [*configuration_names(), "rig_reader", "vacuum_apg"])),
     ):
         assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
 

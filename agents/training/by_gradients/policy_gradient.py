@@ -16,10 +16,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from agents.training.by_gradients.lanes import Lanes, observation_names, observations
 from agents.training.checkpoint import read_checkpoint, require_moments, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.differentiated import Differentiated
-from agents.training.lanes import Lanes, observation_names, observations
 from agents.training.validation import training_seeds
 from agents.training.watch import Watch
 from baselines.network import CLIP, EPSILON, PolicyNetwork
