@@ -15,7 +15,7 @@
 # make devcontainer writes .devcontainer/, where VS Code and Codespaces look, from packaging/container
 # make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
 # make kernels builds the machine code that the package carries, at a release; between two, Numba compiles what was edited
-# make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
+# make targets builds the loop without Python for every target and writes docs/laboratory/targets.md (some minutes; qemu-user runs aarch64)
 
 VENV := .venv
 BIN := $(VENV)/bin

@@ -8,15 +8,15 @@ from pathlib import Path
 
 from _generate import environments
 from _generate.api import api
-from _generate.benchmark import splits, suites
-from _generate.commands import commands
+from _generate.benchmark import records, splits, suites
+from _generate.commands import commands, readers
+from _generate.configurations import configurations
 from _generate.controllers import controllers
 from _generate.drives import faults, provoked
 from _generate.metrics import metrics
 from _generate.page import page
 from _generate.pipeline import pipeline
 from _generate.policies import policies
-from _generate.readers import readers
 from _generate.rig import options, rig
 from _generate.root_pages import PAGES, bibtex, root_page
 from _generate.stages import stage
@@ -28,6 +28,7 @@ PARTS = {
     "api_agents.md": partial(api, "agents"),
     "bibtex.md": bibtex,
     "commands.md": commands,
+    "configurations.md": configurations,
     "controllers.md": controllers,
     "faults.md": faults,
     "metrics.md": metrics,
@@ -38,6 +39,7 @@ PARTS = {
     "provoked.md": provoked,
     "readers.md": readers,
     "rig.md": rig,
+    **records(),
     "splits.md": splits,
     "suites.md": suites,
     **environments.PARTS,

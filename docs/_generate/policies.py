@@ -18,11 +18,11 @@ MEASURED = ("learned", "by-gradients")
 """Results of ``birthsim study`` that have rows of policies."""
 
 USELESS = 50
-"""A score below which a policy is of no use."""
+"""A return below which a policy is of no use."""
 FAR, LOOSE = 10.0, 10.0
 """mm in the worst world, and % of a stiffness, from which on an error counts as a weakness."""
 
-EQUAL = "../honest.md#a-residual-on-equal-information"
+EQUAL = "../laboratory/equal_information.md"
 NOTES = {
     "circle_honest_apg": f"gains [hundredths of a millimetre]({EQUAL}) over the controller that it corrects",
     "circle_honest_student": f"renders stiffness at rest worse than [the controller that it corrects]({EQUAL})",
@@ -43,16 +43,16 @@ def policies() -> str:
         trained.append(_trained(one.name, settings, len(seeds)))
         reached.append(_reached(one.name, settings, results.get(one.name)))
     how = ["policy", "environment, sensors", "corrects", "algorithm", "million steps", "seeds", "rig"]
-    what = ["policy", "score, `ideal`", "score, `lab`", "settled error, mm", "95 %", "stiffness error at rest, %", "95 %"]
+    what = ["policy", "return, `ideal`", "return, `lab`", "settled error, mm", "95 %", "stiffness error at rest, %", "95 %"]
     tables = table([*how, "sees"], trained), table([*what, "known weaknesses"], reached)
     return f"## How they were trained\n\n{tables[0]}\n\n## What they reach\n\n{ABOUT}\n\n{tables[1]}"
 
 
 ABOUT = (
-    "In the task of their training, on randomised rigs. Scores are means over the training seeds, with the worst and best seed "
-    "in brackets ([scores](../scores.md)). Errors are medians and 95th percentiles over worlds and seeds, with the sensors of "
-    "the training ([by reinforcement learning](../learned.md), [by gradients](../gradients.md#a-policy-by-gradients)). A dash "
-    f"was not measured. Weaknesses are a score below {USELESS}, an error of more than {FAR:g} mm in the worst world, and a "
+    "In the task of their training, on randomised rigs. Returns are means over the training seeds, with the worst and best "
+    "seed in brackets ([scale](../scores.md)). Errors are medians and 95th percentiles over worlds and seeds, with the sensors "
+    "of the training ([learned](../laboratory/learned.md), [by gradients](../gradients.md#a-policy-by-gradients)). A dash was "
+    f"not measured. Weaknesses are a return below {USELESS}, an error of more than {FAR:g} mm in the worst world, and a "
     f"stiffness that is off by more than {LOOSE:g} %: that of the air in the median, that at rest in one world of twenty."
 )
 

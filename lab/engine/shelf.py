@@ -23,7 +23,10 @@ from lab.engine.results import changed, read_result
 from lab.engine.study import Study
 
 DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md")
-ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
+ELSEWHERE = {
+    "reference_scores.json": ROOT / "birthsim_env" / "scores.json",
+    "scale.json": ROOT / "birthsim" / "benchmark" / "scale.json",
+}
 """Texts that do not stand in ``DATA``."""
 
 _PICTURE = re.compile(r"\]\((?:\.\./)*(\w+\.svg)\)")

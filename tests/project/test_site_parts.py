@@ -10,6 +10,7 @@ import birthsim
 from birthsim_env.assembly import DEFAULTS
 from birthsim_env.info import FIELDS
 from birthsim_env.parts.scenarios import environment_id, scored_scenarios
+from lab.studies.leaderboard.records import every_entry, openness, standings
 from tests.console import ROOT
 
 DOCS = ROOT / "docs"
@@ -26,8 +27,8 @@ def parts(generated):
 def test_an_environment_has_a_film_a_page_and_its_task_in_the_overview(scenario, parts, generated):
     page = generated(".environments.scores").page_of(scenario)
     text = (DOCS / "environments" / f"{page}.md").read_text(encoding="utf-8")
-    kind = "rail" if page == "rail" else "plane"
-    for part in (f"environment-{scenario}", f"score-{scenario}", f"contract-{kind}"):
+    kind, plain = "rail" if page == "rail" else "plane", environment_id(scenario).removeprefix("BirthSIM/")
+    for part in (f"environment-{scenario}", f"returns-{scenario}", f"record-{plain}", f"contract-{kind}"):
         assert f"docs-generated/{part}.md" in text
     assert f"]({scenario}.webp)" in text
     assert 50_000 < (DOCS / "environments" / f"{scenario}.webp").stat().st_size < LARGEST
@@ -49,19 +50,29 @@ def test_a_contract_names_every_argument_default_and_key_of_info(parts):
         assert re.findall(r"^## (.*)$", text, re.MULTILINE) == titles
 
 
-def test_a_score_to_beat_is_that_of_the_scores_and_says_how_open_it_is(parts):
+def test_returns_of_an_environment_are_those_of_the_scores(parts):
     table = (DOCS / "data" / "scores.md").read_text(encoding="utf-8")
     for scenario in scored_scenarios():
         plain = environment_id(scenario).removeprefix("BirthSIM/").rpartition("-v")[0]
         for sensors in ("ideal", "lab"):
             (row,) = re.findall(rf"^\| {plain} \| {sensors} \| randomised \| .*$", table, re.MULTILINE)
             *_, paper, best, policy = (cell.strip() for cell in row.strip("| ").split("|"))
-            own = re.search(rf"^\| `{sensors}` \| (.*) \|$", parts[f"score-{scenario}.md"], re.MULTILINE)[1].split(" | ")
+            own = re.search(rf"^\| `{sensors}` \| (.*) \|$", parts[f"returns-{scenario}.md"], re.MULTILINE)[1].split(" | ")
             assert own[:2] == [paper, re.sub(r", (.*)", r", `\1`", best)]
             assert own[2] == ("none" if policy == "-" else re.sub(r", (\S+) .*", r", `\1`", policy))
-            behind = None if policy == "-" else int(best.split(",")[0]) - int(policy.split(",")[0])
-            assert own[3].startswith("open" if behind is None or behind > 3 else "closed")
-            assert behind is None or behind <= 3 or f"{behind} behind" in own[3]
+
+
+def test_what_is_to_beat_has_the_records_of_the_leaderboard(parts):
+    known = every_entry()
+    for environment in ("Circle-v2", "Vacuum-v1"):
+        (row,) = re.findall(rf"^\| \[{environment}\].*$", parts["beat.md"], re.MULTILINE)
+        for cell, kind in zip(row.split("|")[2:], ("ideal", "lab", "honest", "honest-no-force"), strict=False):
+            own = standings(f"{environment.partition('-')[0].lower()}-{kind}", known)
+            assert f"**{openness(own)}**" in cell
+            assert not own or f"{own[0].score:.0f}, {own[0].name}" in cell
+            learned = [one for one in own if one.is_learned]
+            assert learned or not own or "learned: none" in cell
+            assert not learned or f"{learned[0].score:.0f}, {learned[0].name}" in cell
 
 
 def test_every_policy_has_its_training_and_its_results(parts):

@@ -6,7 +6,8 @@ from _generate.environments.choices import frictions, hands, sensors
 from _generate.environments.contract import LINKAGES, contract
 from _generate.environments.made import environment
 from _generate.environments.overview import has_page, overview
-from _generate.environments.scores import score_to_beat, what_to_beat
+from _generate.environments.scores import returns, what_to_beat
+from birthsim_env.parts.scenarios import scored_scenarios
 from birthsim_env.registry import names
 
 PARTS = {
@@ -16,10 +17,7 @@ PARTS = {
     "hands.md": hands,
     "sensors.md": sensors,
     **{f"contract-{linkage}.md": partial(contract, linkage) for linkage in LINKAGES},
-    **{
-        f"{part}-{scenario}.md": partial(made, scenario)
-        for part, made in {"environment": environment, "score": score_to_beat}.items()
-        for scenario in filter(has_page, names("scenario"))
-    },
+    **{f"environment-{scenario}.md": partial(environment, scenario) for scenario in filter(has_page, names("scenario"))},
+    **{f"returns-{scenario}.md": partial(returns, scenario) for scenario in scored_scenarios()},
 }
 """File -> what returns its text."""

@@ -1,66 +1,57 @@
-"""What others reach in an environment, from docs/data/scores.csv, and how open that leaves it."""
+"""What is to beat: the records of the benchmark in a matrix, and the returns that controllers and policies reach."""
 
 import csv
-import math
 from pathlib import Path
+from typing import Any
 
 from _generate.tables import table
-from birthsim.benchmark.suites import SUITES
-from birthsim_env.parts.scenarios import environment_id, find_scenario, scored_scenarios
+from birthsim.benchmark.suites import TASKS
+from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.topology import RAIL
-from birthsim_env.scores import BEST, is_scored, reference_scores
+from birthsim_env.registry import names
+from birthsim_env.scores import BEST, reference_scores
+from lab.studies.leaderboard.records import every_entry, openness, standings
 
 FILE = Path(__file__).resolve().parents[2] / "data" / "scores.csv"
-POLICY, NOBODY = "best learned policy", "none"
-CLOSE = 3
-"""A policy that is no more behind the best controller reaches it."""
+POLICY = "best learned policy"
 
-
-def score_to_beat(scenario: str) -> str:
-    """What others reach in an environment, how open that leaves it, and its tasks in the benchmark's suites."""
-    rows = []
-    for sensors in ("ideal", "lab"):
-        paper, best, policy = scores(scenario, sensors)
-        rows.append([f"`{sensors}`", paper, best, policy, _openness(best, policy)])
-    head = ["sensors", "paper's controller", "best controller", "best learned policy", "how open"]
-    return "\n\n".join([table(head, rows), *_suites_of(environment_id(scenario))])
+COLUMNS = {"`ideal`": "ideal", "`lab`": "lab", "`honest`": "honest", "`honest`, force not measured": "honest-no-force"}
+"""Heading -> how names of the benchmark's tasks end."""
 
 
 def what_to_beat() -> str:
-    """A row for every scored environment with ``lab`` sensors, the most open first."""
-    found = [(scenario, scores(scenario, "lab")) for scenario in scored_scenarios()]
-    found.sort(key=lambda one: _behind(one[1][1], one[1][2]), reverse=True)
-    rows = [
-        [f"[{environment_id(scenario)}](../environments/{page_of(scenario)}.md)", *own, _openness(own[1], own[2])]
-        for scenario, own in found
-    ]
-    return table(["environment", "paper's controller", "best controller", "best learned policy", "how open"], rows)
+    """A row for each environment that has tasks, and a cell for each of four kinds of sensors."""
+    known, rows = every_entry(), []
+    for scenario in names("scenario"):
+        tasks = [f"{scenario}-{kind}" for kind in COLUMNS.values()]
+        if any(task in TASKS for task in tasks):
+            called = environment_id(scenario).removeprefix("BirthSIM/")
+            cells = [_cell(task, known) if task in TASKS else "" for task in tasks]
+            rows.append([f"[{called}](../environments/{page_of(scenario)}.md)", *cells])
+    return table(["environment", *COLUMNS], rows)
 
 
-def _behind(best: str, policy: str) -> float:
-    """How many points the best policy is behind the best controller; without a policy nothing says."""
-    return -math.inf if policy == NOBODY else int(best.partition(",")[0]) - int(policy.partition(",")[0])
+def _cell(task: str, known: dict[str, Any]) -> str:
+    """How open a task is, its record, and that of learned entries where it is another."""
+    own = standings(task, known)
+    lines = [f"**{openness(own)}**"]
+    if own:
+        lines.append(f"{own[0].score:.0f}, {own[0].name}")
+        learned = next((one for one in own if one.is_learned), None)
+        if learned is not own[0]:
+            lines.append(f"learned: {learned.score:.0f}, {learned.name}" if learned else "learned: none")
+    return "<br>".join(lines)
 
 
-def _openness(best: str, policy: str) -> str:
-    if policy == NOBODY:
-        return "open: no policy has been trained"
-    behind = _behind(best, policy)
-    return f"open: the best policy is {behind} behind" if behind > CLOSE else "closed: a policy reaches the best controller"
+def returns(scenario: str) -> str:
+    """What others are paid in an environment, on the scale of returns."""
+    rows = [[f"`{sensors}`", *_returns(scenario, sensors)] for sensors in ("ideal", "lab")]
+    return table(["sensors", "paper's controller", "best classical controller", "best policy that is shipped"], rows)
 
 
-def _suites_of(name: str) -> list[str]:
-    """A sentence for each suite that has tasks in an environment."""
-    tasks = {suite: [f"`{task.name}`" for task in SUITES[suite] if task.environment == name] for suite in SUITES}
-    called = "Tasks of the [benchmark](../benchmark.md)'s suite"
-    return [f"{called} `{suite}`: {', '.join(own)}." for suite, own in tasks.items() if own]
-
-
-def scores(scenario: str, sensors: str) -> list[str]:
+def _returns(scenario: str, sensors: str) -> list[str]:
     """On randomised rigs: of the paper's controller, and of the best ones with their names."""
     name = environment_id(scenario)
-    if not is_scored(name):
-        return [NOBODY] * 3
     with FILE.open(encoding="utf-8") as file:
         rows = [(row["scenario"], row["sensors"], row["rig"], row["controller"], row["score"]) for row in csv.DictReader(file)]
     plain = name.removeprefix("BirthSIM/").rpartition("-v")[0]
@@ -69,7 +60,7 @@ def scores(scenario: str, sensors: str) -> list[str]:
     cells = [known[roles["paper's law"]["controller"]]]
     for role in (BEST, POLICY):
         who = roles[role]["controller"] if role in roles else ""
-        cells.append(f"{known[who]}, `{who.partition(' ')[0]}`" if who else NOBODY)
+        cells.append(f"{known[who]}, `{who.partition(' ')[0]}`" if who else "none")
     return cells
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from baselines.bench.pieces import controller_settings, file_stem
 from baselines.bench.probes import board_limit
 from baselines.bench.resting import RestingRigs
-from baselines.bench.statistics import crossed_interval, number, quantile
+from baselines.bench.statistics import crossed_interval, quantile
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Complex, declared_by, mass_spring_damper
 from baselines.work.tasks import Result, Task
@@ -19,7 +19,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, digits, markdown
 from lab.studies.bandwidth.stimuli import KINDS, Multisine, stimuli, words_of
 from lab.studies.bandwidth.valves import commanded_openings
 from lab.studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
@@ -199,21 +199,25 @@ def _kept(options: Options, found: Found) -> Any:
     return {"columns": COLUMNS, "rows": rows}
 
 
+def _entry(median: float, low: float, high: float, worst: float) -> list[str | float]:
+    return [f"{digits(median)} [{digits(low)}, {digits(high)}]", worst]
+
+
 def _shown(content: Content) -> dict[str, str]:
-    head = ["sensors", "what the hand does", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]
-    rows = [["controller", *information.COLUMNS, *head]]
+    statistics = ("median [95 % interval]", "worst")
+    heads = [Head(quantity, statistics) for quantity in ("bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz")]
+    rows: list[list[Cell | Head]] = [
+        ["controller", *information.COLUMNS, "sensors", "what the hand does", "axis", *heads, "lost"]
+    ]
     for row in content["figures"]["rows"]:
-        cells = [
-            "-" if row[first] is None else "{} [{}, {}]; {}".format(*map(number, row[first : first + 4]))
-            for first in (4, 8, 12)
-        ]
+        cells = ["-" if row[first] is None else _entry(*row[first : first + 4]) for first in (4, 8, 12)]
         push = words_of(row[2], content["settings"]["seed"])
         model, file = RIGS[row[1]]
         rig = information.TOLD if row[1] == KNOWN else information.DEFAULT
         facts = information.informed(row[0], model, rig=rig, parameters=file or "")
-        rows.append([row[0], *facts, row[1], push, row[3], *cells, str(row[-1])])
-    alike = [(row[1], *row[3:7]) for row in rows[1:]]
-    return {"bandwidth.md": f"{SAID} {information.LEGEND}\n\n{markdown(rows, most=rows[0][7:9], alike=alike)}\n"}
+        rows.append([f"`{row[0]}`", *facts, row[1], push, row[3], *cells, str(row[-1])])
+    alike = [tuple(map(str, (row[1], *row[3:7]))) for row in rows[1:]]
+    return {"bandwidth.md": f"{SAID} {information.LEGEND}\n\n{markdown(rows, most=heads[:2], alike=alike)}\n"}
 
 
 STUDY = Study(

@@ -19,7 +19,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, SPREAD_AND_WORST, Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.learned import felt
 
@@ -145,22 +145,30 @@ def _summary(figures: dict[str, Any]) -> str:
 
 def _beside(figures: dict[str, Any]) -> str:
     """Policies beside classical controllers."""
-    settled, *others = [name for name, _ in COMPARED.values()]
-    rows = [["world, sensors", "controller", *information.COLUMNS, settled, *felt.COLUMNS.values(), *others, "lost"]]
+    settled, *others = [Head(name, SPREAD_AND_WORST[:count]) for name, count in COMPARED.values()]
+    heads = [settled, *(Head(name, SPREAD) for name in felt.COLUMNS.values()), *others]
+    rows: list[list[Cell | Head]] = [["world, sensors", "controller", *information.COLUMNS, *heads, "lost"]]
     alike = []
     for policy, found in figures.items():
         every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
         for controller in dict.fromkeys(row[2] for row in every):
             own = {row[0]: row[1:] for row in every if row[2] == controller}
-            tracks = [cells(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()]
-            touch = [cells(found["felt"][controller][name][:2]) for name in felt.COLUMNS]
+            tracks: list[Cell] = [
+                list(map(_number, own[metric][2 : 2 + count])) if metric in own else "-"
+                for metric, (_, count) in COMPARED.items()
+            ]
+            touch = [found["felt"][controller][name][:2] for name in felt.COLUMNS]
             learned = controller.startswith("residual")
             name = controller.replace("residual", policy) if learned else controller
             of, _, lost, *_ = own["lost episodes"]
             facts = information.informed(f"residual:{policy}" if learned else controller, RUNS[policy].sensors)
             rows.append([world, name, *facts, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
             alike.append((policy, facts[0], facts[2]))
-    return f"{_worlds(figures)} {information.LEGEND}\n\n{markdown(rows, rows[0][5:-1], alike=alike)}\n"
+    return f"{_worlds(figures)} {information.LEGEND}\n\n{markdown(rows, heads, alike=alike)}\n"
+
+
+def _number(text: str) -> float | str:
+    return float(text) if text[-1:].isdigit() else text
 
 
 def _worlds(policies: Iterable[str]) -> str:
