@@ -19,7 +19,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import SPREAD, SPREAD_AND_WORST, Cell, Head, markdown
+from lab.engine.tables import SPREAD, SPREAD_AND_WORST, Cell, Head, digits, markdown
 from lab.engine.worlds import worlds
 from lab.studies.learned import felt
 
@@ -115,16 +115,22 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    parts, rows = [_beside(content["figures"])], [["policy", *DATA]]
+    rows: list[list[str]] = [["policy", *DATA]]
+    parts: dict[bool, list[str]] = {True: [], False: []}
     for policy, found in content["figures"].items():
         run = RUNS[policy]
         world = f"{run.environment}, {run.episodes} episodes from seed {run.seed}, {run.sensors} sensors, randomised rigs."
-        parts += [f"## {policy}", world, *map(as_table, found["beside"].values())]
+        parts[policy.startswith("circle")] += [f"## {policy}", world, *map(as_table, found["beside"].values())]
         rows += [[policy, *row] for row in found["metrics"]["rows"]]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     summary = _summary(content["figures"])
-    return {"learned.md": "\n\n".join(parts) + "\n", "learned.csv": text.getvalue(), "residual.md": summary}
+    each = {
+        f"learned-{where}.md": "\n\n".join(parts[on_circle]) + "\n"
+        for where, on_circle in (("circle", True), ("elsewhere", False))
+        if parts[on_circle]
+    }
+    return {"learned.md": _beside(content["figures"]), **each, "learned.csv": text.getvalue(), "residual.md": summary}
 
 
 def _summary(figures: dict[str, Any]) -> str:
@@ -139,7 +145,7 @@ def _summary(figures: dict[str, Any]) -> str:
         paper, under = (own[name] for name in RUNS[policy].controllers)
         less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
         off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
-        lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
+        lines.append([policy.capitalize(), *map(digits, (paper[3], under[3], paper[4])), off])
     return f"{_worlds(shown)}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
