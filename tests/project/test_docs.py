@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from agents.training.configuration import configuration_names
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
 from birthsim.main import COMMANDS
@@ -82,10 +83,10 @@ def test_generated_parts_know_everything(parts):
     commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
     ids = [name for name in environment_ids() if "Residual" not in name]
     fields = [name for section in Parameters().to_dict().values() for name in section]
-    named = [*ids, *names("sensors"), *names("hand")]
     for part, known in (
-        *(("commands.md", commands), ("environments.md", named), ("metrics.md", UNITS), ("rig.md", fields)),
-        ("readers.md", names("reader")),
+        *(("commands.md", commands), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)),
+        *(("sensors.md", names("sensors")), ("hands.md", names("hand")), ("frictions.md", names("friction"))),
+        *(("readers.md", names("reader")), ("configurations.md", [*configuration_names(), "rig_reader", "vacuum_apg"])),
     ):
         assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
 
@@ -176,7 +177,7 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.csv")}
     columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
     text = "".join([*PAGES.values(), *TABLES.values()])
-    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((data/[^)]+)\)", text)}
+    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((?:\.\./)?(data/[^)]+)\)", text)}
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
     others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
     assert columns == compared | others
@@ -186,7 +187,7 @@ NOTEBOOKS = [page for page, text in PAGES.items() if "{code-cell}" in text]
 BRIEF = ("tutorials/first_episode",)
 """Notebooks that a commit runs; the others weekly."""
 
-LARGE = ("comparison", "reference/environments", "reference/commands")
+LARGE = ("laboratory/comparison", "environments/index", "environments/circle", "reference/commands")
 """Pages of which each takes axe half a minute."""
 
 
