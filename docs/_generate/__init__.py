@@ -9,7 +9,8 @@ from pathlib import Path
 from _generate.api import api
 from _generate.benchmark import splits, suites
 from _generate.commands import commands
-from _generate.controllers import controllers
+from _generate.controllers import FAMILIES, controllers, guarding
+from _generate.controllers import options as controller_options
 from _generate.drives import faults, provoked
 from _generate.environments import environments
 from _generate.metrics import metrics
@@ -28,8 +29,10 @@ PARTS = {
     "api_agents.md": partial(api, "agents"),
     "commands.md": commands,
     "controllers.md": controllers,
+    **{f"controllers_{family}.md": partial(controller_options, family) for family in FAMILIES},
     "environments.md": environments,
     "faults.md": faults,
+    "guarding.md": guarding,
     "metrics.md": metrics,
     "options.md": options,
     "page.md": page,
