@@ -18,6 +18,7 @@ from birthsim_env import Parameters
 from birthsim_env.ids import environment_ids
 from birthsim_env.registry import names
 from lab.studies.comparison import tables as comparison_tables
+from lab.studies.leaderboard import tables as leaderboard_tables
 from lab.studies.scores import tables as score_tables
 from tests.console import ROOT
 from tests.live import axe, browser
@@ -180,6 +181,7 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((?:\.\./)?(data/[^)]+)\)", text)}
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
     others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
+    others["leaderboard.csv"] = leaderboard_tables.DATA
     assert columns == compared | others
 
 
