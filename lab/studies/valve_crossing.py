@@ -23,7 +23,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import SEED, worlds
 
 CHOSEN = 920_000
@@ -80,12 +80,14 @@ def _crossing(value: float | None) -> str:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", *information.COLUMNS, "sensors", "crossing", *(head for _, _, head in COLUMNS.values())]]
+    heads = [Head(head, SPREAD) for _, _, head in COLUMNS.values()]
+    rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, "sensors", "crossing", *heads]]
     for row in content["figures"]:
         if row["worlds"] == "judged":
-            figures = [cells(row[name], " / ") for name in COLUMNS]
             facts = information.informed(row["controller"], row["sensors"])
-            rows.append([f"`{row['controller']}`", *facts, row["sensors"], _crossing(row["crossing"]), *figures])
+            rows.append(
+                [f"`{row['controller']}`", *facts, row["sensors"], _crossing(row["crossing"]), *(row[name] for name in COLUMNS)]
+            )
     count = content["settings"]["episodes"]
     chosen = f"The crossing was chosen on {worlds(CHOSEN, count)}, which the picture has too."
     said = f"{worlds(content['settings']['seed'], count)}. {chosen}"
