@@ -12,7 +12,7 @@ from birthsim.benchmark.row import overall
 from birthsim.benchmark.scoring import judge, plan
 from birthsim.benchmark.suites import SUITES
 from lab.engine.shelf import DATA
-from lab.studies.leaderboard import entries, records, repeat, tables
+from lab.studies.leaderboard import entries, records, repeat
 
 PID = entries.ENTRIES / "pid.json"
 REPEATED = {"pid": 3, "circle_honest_apg": 3}
@@ -25,8 +25,8 @@ def known():
 
 
 def test_the_tables_are_those_of_the_entries():
-    for file, text in tables.texts().items():
-        assert (DATA / file).read_text(encoding="utf-8") == text, file
+    for path, text in repeat.pages().items():
+        assert path.read_text(encoding="utf-8") == text, path
 
 
 @pytest.mark.parametrize("path", entries.entries(), ids=lambda path: path.stem)

@@ -13,6 +13,7 @@ from lab.studies.leaderboard import who
 from lab.studies.leaderboard.cards import cards
 from lab.studies.leaderboard.entries import RULES
 from lab.studies.leaderboard.records import every_entry, records, standings
+from lab.studies.leaderboard.to_beat import to_beat
 
 Known = dict[str, dict[str, Any]]
 """Name -> entry."""
@@ -41,6 +42,7 @@ def texts() -> dict[str, str]:
     }
     own |= {
         "leaderboard-worlds.md": said,
+        "to_beat.md": to_beat(known),
         "leaderboard-entries.md": _entries(known),
         "leaderboard-tasks.md": "\n\n".join(_task(task, known) for task in TASKS),
         "leaderboard-cards.md": cards(known),
