@@ -3,7 +3,6 @@
 A file that ``birthsim export --to onnx`` wrote says which controller its actions correct; another one drives the valves.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from agents.residual.settings import ResidualSettings
 from birthsim_env.extras import installation
 from birthsim_env.loop.signals import Mask
+from birthsim_env.physics.rig.json_reading import parse_json
 from birthsim_env.physics.rig.reading import named
 from birthsim_env.physics.rig.values import problem
 
@@ -44,7 +44,7 @@ class OnnxPolicy:
         try:
             self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
             about = self._session.get_modelmeta().custom_metadata_map
-            self.settings = ResidualSettings(**json.loads(about["settings"])) if "settings" in about else None
+            self.settings = ResidualSettings(**parse_json("settings", about["settings"], dict)) if "settings" in about else None
         except Exception as error:  # of the library's own kinds, and of what a file says
             raise ValueError(f"policy = {named(path)} is no policy ({problem(error)}); allowed: an ONNX file") from error
         (self._input, *memory), outputs = self._session.get_inputs(), self._session.get_outputs()

@@ -22,7 +22,7 @@ RUN = "run"
 """The only run in it."""
 
 FILES = "events.out.tfevents.*"
-"""What TensorBoard calls its files."""
+"""What TensorBoard calls a file: the second at which it was begun follows. Files are read in the order of their names."""
 
 
 class Events:
@@ -30,12 +30,17 @@ class Events:
 
     def __init__(self, folder: Path, sizes: Mapping[str, Any]) -> None:
         self._run = folder / EVENTS / RUN
-        for path in self._run.glob(FILES):
-            size = sizes.get(path.name)
+        kept = 0
+        for path in self._files():
+            size = sizes.get(_begun(path))
             if type(size) is not int or size <= 0:
                 path.unlink()
-            elif path.stat().st_size > size:
+                continue
+            if path.stat().st_size > size:
                 os.truncate(path, size)
+            # Another begins now, maybe in the same second, or by a clock that was set back: a number goes before its name.
+            path.rename(path.with_name(f"{kept:04d}.{_begun(path)}"))
+            kept += 1
         self.writer = SummaryWriter(str(self._run))
 
     def add(self, values: Mapping[str, float], steps: int) -> None:
@@ -44,13 +49,22 @@ class Events:
             self.writer.add_scalar(name, value, steps)
 
     def sizes(self) -> dict[str, int]:
-        """Name of each file -> its size in bytes, with all that was added so far."""
+        """What each file was called when it was begun -> its size in bytes, with all that was added so far."""
         self.writer.flush()
-        return {path.name: path.stat().st_size for path in self._run.glob(FILES)}
+        return {_begun(path): path.stat().st_size for path in self._files()}
+
+    def _files(self) -> list[Path]:
+        """In the order in which they were written."""
+        return sorted(self._run.glob(f"*{FILES}"))
 
     def close(self) -> None:
         """Write what is left."""
         self.writer.close()
+
+
+def _begun(path: Path) -> str:
+    """What a file was called before a number went before it: a checkpoint knows it by that name, whenever the number came."""
+    return FILES[:-1] + path.name.partition(FILES[:-1])[2]
 
 
 @contextmanager

@@ -72,7 +72,10 @@ def test_tables_say_lost_and_refused():
         {"stiffness": 0.0, "refused": "stiffness setpoint ..."},
     ]
     table = backdriving_table([{**run, "backdriving": pieces}])
-    assert "| sensors | at 500 N/m: median of the means | at 500 N/m: largest | at 0 N/m: median of the means |" in table
+    assert (
+        "| controller | rig | mass learned | force sensed | sensors "
+        "| at 500 N/m: median of the means | at 500 N/m: largest | at 0 N/m: median of the means |" in table
+    )
     assert "| `pid` | default | no | no | lab | 2.00 | lost | refused | refused |" in table
     piece = {"lost": [False], "overshoot_mm": [5.0], "speed": [1.5], "kinetic": [3.0], "energy": [0.0], "stored": 4.5}
     first, second = release_table([{**run, "release": [{**piece, "ideal": None}]}]).split("\n\n")[1:]

@@ -9,7 +9,7 @@ import torch
 
 from agents import TrainingSettings, load_policy
 from agents.policy.seeds import best_policy
-from agents.training.lanes import Lanes
+from agents.training.by_gradients.lanes import Lanes
 from agents.training.validation import TRAINING_SEED
 from birthsim_live.rig.learning import worlds
 from birthsim_live.rig.pack import LEARNED
@@ -72,7 +72,11 @@ def test_gradients_are_those_of_training(page, horizon, steps):
     parts = [part for pair in widths for part in (torch.nn.Linear(*pair), torch.nn.Tanh())]
     policy = torch.nn.Sequential(*parts).double()
     mean, deviation = (torch.tensor(about[name], dtype=torch.float64) for name in ("mean", "deviation"))
-    lanes.cost(lambda seen: policy(((seen - mean) / deviation).clamp(-about["clip"], about["clip"]))).backward()  # type: ignore[no-untyped-call]
+
+    def decided(seen, held):
+        return policy(((seen - mean) / deviation).clamp(-about["clip"], about["clip"])), held
+
+    lanes.cost(decided).backward()
     asked = {"lanes": COUNT, "horizon": horizon, "steps": steps}
     weights = torch.cat([one.detach().flatten() for one in policy.parameters()]).tolist()
     gradient, seen, left = node(page, BEGUN + GRADIENT, {"about": asked, "weights": weights})
