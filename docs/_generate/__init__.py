@@ -11,7 +11,8 @@ from _generate.api import api
 from _generate.benchmark import records, splits, suites
 from _generate.commands import commands, readers
 from _generate.configurations import configurations
-from _generate.controllers import controllers
+from _generate.controllers import FAMILIES, controllers, guarding
+from _generate.controllers import options as controller_options
 from _generate.drives import faults, provoked
 from _generate.metrics import metrics
 from _generate.page import page
@@ -30,7 +31,9 @@ PARTS = {
     "commands.md": commands,
     "configurations.md": configurations,
     "controllers.md": controllers,
+    **{f"controllers_{family}.md": partial(controller_options, family) for family in FAMILIES},
     "faults.md": faults,
+    "guarding.md": guarding,
     "metrics.md": metrics,
     "options.md": options,
     "page.md": page,

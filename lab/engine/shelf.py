@@ -22,7 +22,7 @@ from lab.engine.door import OWN, studies
 from lab.engine.results import changed, read_result
 from lab.engine.study import Study
 
-DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md")
+DATA = ROOT / "docs" / "data"
 ELSEWHERE = {
     "reference_scores.json": ROOT / "birthsim_env" / "scores.json",
     "scale.json": ROOT / "birthsim" / "benchmark" / "scale.json",
@@ -30,9 +30,6 @@ ELSEWHERE = {
 """Texts that do not stand in ``DATA``."""
 
 _PICTURE = re.compile(r"\]\((?:\.\./)*(\w+\.svg)\)")
-_MARKED = re.compile(r"^<!-- results of (\w+) -->$.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)
-"""A table of a page: comments on lines of their own. A line that begins with a comment and goes on with text would be HTML to
-CommonMark, and its Markdown would stay raw, so there are no comments within lines."""
 
 
 def main() -> None:
@@ -97,13 +94,7 @@ def texts(name: str) -> Iterator[tuple[Path, str]]:
 
 def rendered() -> dict[Path, str]:
     """Every file that shows results, and what should stand in it."""
-    found = {path: text for name in names() for path, text in texts(name)}
-    tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
-    for page in PAGES:
-        found[page] = _MARKED.sub(
-            lambda mark: f"<!-- results of {mark[1]} -->\n\n{tables[mark[1]]}\n<!-- end -->", page.read_text(encoding="utf-8")
-        )
-    return found
+    return {path: text for name in names() for path, text in texts(name)}
 
 
 def render() -> None:

@@ -92,7 +92,3 @@ BROKEN = {
 @pytest.mark.parametrize("what", BROKEN)
 def test_what_breaks_is_found(what):
     assert problems(BROKEN[what]) != [] or shown(BROKEN[what]) != meant(BROKEN[what])
-
-
-def test_a_table_between_comments_is_whole():
-    assert problems("Before.\n\n<!-- results of a -->\n\n| a | b |\n|---|---|\n| **1** | `2` |\n\n<!-- end -->\n\nAfter.") == []

@@ -1,4 +1,4 @@
-"""The table of README: what each controller is told, and its settled error on the circle with every kind of sensors."""
+"""The table of the circle: what each controller is told, and its settled error for each kind of sensors."""
 
 import numpy as np
 

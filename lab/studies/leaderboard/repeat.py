@@ -17,6 +17,7 @@ from lab.engine.results import written
 from lab.engine.shelf import DATA
 from lab.studies.leaderboard.entries import ENTRIES, RULES, against_rules, entries, entry, own_entries, policies_of
 from lab.studies.leaderboard.tables import texts
+from lab.studies.leaderboard.to_beat import README, in_readme
 
 UNLIKE = ("seconds", "versions")
 """What differs from run to run, and from machine to machine."""
@@ -47,8 +48,14 @@ def main(settings: Settings) -> None:
         print(f"{shown(name)}: {said or 'written anew' if settings.renew else said or 'repeats in every bit'}", flush=True)
     if any(problems.values()):
         raise SystemExit(1)
-    for file, text in texts().items():
-        write_text(DATA / file, text)
+    for path, text in pages().items():
+        write_text(path, text)
+
+
+def pages() -> dict[Path, str]:
+    """File -> its text: those of docs/data, and README with the table of what is to beat."""
+    own = texts()
+    return {DATA / name: text for name, text in own.items()} | {README: in_readme(own["to_beat.md"])}
 
 
 def _chosen(settings: Settings) -> list[Path]:

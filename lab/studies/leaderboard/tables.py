@@ -13,6 +13,7 @@ from lab.studies.leaderboard import who
 from lab.studies.leaderboard.cards import cards
 from lab.studies.leaderboard.entries import RULES
 from lab.studies.leaderboard.records import every_entry, records, standings
+from lab.studies.leaderboard.to_beat import to_beat
 
 Known = dict[str, dict[str, Any]]
 """Name -> entry."""
@@ -36,6 +37,7 @@ def texts() -> dict[str, str]:
     own = {f"leaderboard-{suite}.md": f"{_ranking(suite, known)}\n\n{records(suite, known)}" for suite in SUITES}
     own |= {
         "leaderboard-worlds.md": said,
+        "to_beat.md": to_beat(known),
         "leaderboard-entries.md": _entries(known),
         "leaderboard-tasks.md": "\n\n".join(_task(task, known) for task in TASKS),
         "leaderboard-cards.md": cards(known),
