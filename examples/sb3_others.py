@@ -28,7 +28,7 @@ REMEMBERED = {
 
 ALGORITHMS = {
     "recurrent-ppo": (RecurrentPPO, "MlpLstmPolicy", ROLLOUTS, 200_000),
-    "sac": (SAC, "MlpPolicy", REMEMBERED, 120_000),
+    "sac": (SAC, "MlpPolicy", REMEMBERED, 50_000),
     "tqc": (TQC, "MlpPolicy", REMEMBERED, 50_000),
 }
 

@@ -13,6 +13,7 @@ import pytest
 from agents.training.configuration import configuration_names
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
+from baselines.named import GUARDING, known_options, resolved, uncontrolled_names
 from birthsim.main import COMMANDS
 from birthsim_env import Parameters
 from birthsim_env.ids import environment_ids
@@ -90,6 +91,23 @@ def test_generated_parts_know_everything(parts):
         *(("readers.md", names("reader")), ("configurations.md", [*configuration_names(), "rig_reader", "vacuum_apg"])),
     ):
         assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
+
+
+@pytest.mark.parametrize("name", sorted({resolved(name)[0] for name in names("controller")}))
+def test_each_option_and_gain_of_a_controller_has_its_meaning_and_what_is_allowed(generated, name):
+    of = generated(".controllers")
+    page = "".join(of.options(family) for family in of.FAMILIES)
+    section = page.partition(f"### `{name}`\n")[2].partition("###")[0] if f"### `{name}`" in page else ""
+    on_pages = [option for option in known_options(name) or () if option not in GUARDING]
+    if name in ("residual", *uncontrolled_names()):
+        assert not section
+        return
+    rows = {row.split(" | ")[0].strip("| `"): row.strip("| ").split(" | ") for row in section.splitlines() if row[:3] == "| `"}
+    assert list(rows) == on_pages
+    for option, (_, unit, meaning, *others) in rows.items():
+        assert meaning.strip(), f"{option} has no meaning: docs/_generate/controllers.py"
+        assert all(cell.strip() for cell in others), option
+        assert unit.strip() or not re.search(r"\d", others[-1]) or "`" in others[-1], option
 
 
 def test_pages_of_the_code_spell_out_arguments_and_defaults(parts):
@@ -180,8 +198,11 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     text = "".join([*PAGES.values(), *TABLES.values()])
     assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((?:\.\./)?(data/[^)]+)\)", text)}
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
-    others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
-    others["leaderboard.csv"] = leaderboard_tables.DATA
+    others = {
+        "scores.csv": score_tables.DATA,
+        "learned.csv": ("policy", *evaluation.DATA),
+        "leaderboard.csv": leaderboard_tables.DATA,
+    }
     assert columns == compared | others
 
 
