@@ -17,6 +17,8 @@ PAGES = {
 }
 """File -> its page in docs/project."""
 
+CITATION = "CITATION.cff"
+
 
 def root_page(name: str) -> str:
     """A page without its title, with links as seen from docs/project."""
@@ -25,14 +27,14 @@ def root_page(name: str) -> str:
         # What a changelog links to was there at the time: the page stays, a heading may not.
         text = re.sub(r"\]\((docs/[^)#]+)#[^)]*\)", r"](\1)", text)
     text = re.sub(r"\]\(docs/", "](../", text)
-    for file, page in PAGES.items():
+    for file, page in {**PAGES, CITATION: "citing"}.items():
         text = text.replace(f"]({file})", f"]({page}.md)").replace(f"](../{file})", f"]({page}.md)")
     return text
 
 
 def bibtex() -> str:
     """Entries of the paper and of the software, from CITATION.cff."""
-    cited: dict[str, Any] = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    cited: dict[str, Any] = yaml.safe_load((ROOT / CITATION).read_text(encoding="utf-8"))
     paper = cited["preferred-citation"]
     entries = [
         _entry(

@@ -116,7 +116,8 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
                         mark = "x" if row["crossing"] is None else "o"
                         panel.plot(row["settled"][0], row["held_turns"][0], mark, color=colour, fillstyle="none")
             panel.set(title=f"{sensors} sensors", xlabel="settled error of circles (mm)")
-            panel.set_ylim(bottom=0.0)
+            low, high = panel.get_ylim()
+            panel.set_ylim(bottom=0.0 if low < high / 2.0 else low)
         axes[0, 0].set_ylabel("turns of a valve (1/s)")
         cost = 100 * _cost(rows, kinds[0], own)
         words = f"With {kinds[0]} sensors a crossing of {100 * own:g} % of full flow (o) errs by {cost:.2g} % more"

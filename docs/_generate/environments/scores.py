@@ -11,6 +11,7 @@ from birthsim_env.physics.rig.topology import RAIL
 from birthsim_env.registry import names
 from birthsim_env.scores import BEST, reference_scores
 from lab.studies.leaderboard.records import every_entry, openness, standings
+from lab.studies.leaderboard.who import title
 
 FILE = Path(__file__).resolve().parents[2] / "data" / "scores.csv"
 POLICY = "best learned policy"
@@ -36,7 +37,7 @@ def _cell(task: str, known: dict[str, Any]) -> str:
     own = standings(task, known)
     lines = [f"**{openness(own)}**"]
     if own:
-        lines.append(f"{own[0].score:.0f}, {own[0].name}")
+        lines.append(f"{own[0].score:.0f}, {title(own[0].name, own[0].said)}")
         learned = next((one for one in own if one.is_learned), None)
         if learned is not own[0]:
             lines.append(f"learned: {learned.score:.0f}, {learned.name}" if learned else "learned: none")

@@ -21,7 +21,7 @@ FIRST = (
 
 
 def cards(known: dict[str, dict[str, Any]]) -> str:
-    """A card for each learned entry, to be opened."""
+    """A card for each learned entry."""
     return "\n\n".join(_card(name, said) for name, said in known.items() if any(one != "controller" for one in said["kinds"]))
 
 
@@ -44,4 +44,4 @@ def _card(name: str, said: dict[str, Any]) -> str:
             ", ".join(f"`{key} = {value}`" for key, value in settings.items() if key not in FIRST) or "-",
         ],
     ]
-    return f"<details>\n<summary>{name}</summary>\n\n{markdown(rows)}\n\n</details>"
+    return f"`{name}`:\n\n{markdown(rows)}"

@@ -29,12 +29,17 @@ DATA = (
 )
 """Columns of the data file; a success is a fraction, an error has mm."""
 
+_RANKING, _RECORDS = "Entries that have every task of the suite:", "Records of its tasks:"
+
 
 def texts() -> dict[str, str]:
     """File of docs/data -> its text."""
     known = every_entry()
     said = f"{worlds(RULES['seed'], RULES['episodes'])}, the same for every entry. In brackets: 95 % intervals."
-    own = {f"leaderboard-{suite}.md": f"{_ranking(suite, known)}\n\n{records(suite, known)}" for suite in SUITES}
+    own = {
+        f"leaderboard-{suite}.md": f"{_RANKING}\n\n{_ranking(suite, known)}\n\n{_RECORDS}\n\n{records(suite, known)}"
+        for suite in SUITES
+    }
     own |= {
         "leaderboard-worlds.md": said,
         "to_beat.md": to_beat(known),
@@ -70,14 +75,14 @@ def _entries(known: Known) -> str:
 
 
 def _task(task: str, known: Known) -> str:
-    """All entries of a task, to be opened."""
+    """All entries of a task, the best first."""
     own = standings(task, known)
     rows = [["entry", "score", "success", "error, mm", "lost"]]
     for one in own:
         feasible = one.row["episodes"] - len(one.row["infeasible"])
         lost = f"{sum(one.row['lost'])} of {feasible * len(one.row['lost'])}"
         rows.append([who.title(one.name, one.said), *map(one.shown, SHOWN), lost])
-    return f"<details>\n<summary>{task}: {len(own)} entries</summary>\n\n{markdown(rows)}\n\n</details>"
+    return f"`{task}`:\n\n{markdown(rows)}"
 
 
 def _data(known: Known) -> str:
