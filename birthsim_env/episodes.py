@@ -103,6 +103,12 @@ class Episodes:
         self._complete = self.simulation.draw(now[0], parts) and self._complete
         self._asked, self._path = asked, None
 
+    def _draw_of_state(self, asked: Any) -> None:
+        try:
+            self._draw(asked)
+        except ValueError as error:
+            raise ValueError(f"state draws what this environment cannot: {error}") from error
+
     def _require_begun(self, call: str) -> None:
         """Raise ``RuntimeError`` where lanes must begin before this ``call``."""
         if not self.begun:
@@ -123,7 +129,7 @@ class Episodes:
         own = take_state(self._parts(random, ended)) if asked != self._asked else {}
         try:
             if own:
-                self._draw(asked)
+                self._draw_of_state(asked)
             give_state(self._parts(random, ended), state)
         except ValueError:
             if own:

@@ -92,13 +92,12 @@ MEANINGS: dict[str, tuple[str, str]] = {
 
 
 def controllers() -> str:
-    """A table of controllers and one of policies."""
+    """Tables of controllers, of names that are short for others, and of policies."""
     compiled = compiled_names()
     rows = [
         (
             f"[`{one.name}`]({page}.md)" if (page := _family(one)) else f"`{one.name}`",
             one.about,
-            _short_for(one.name),
             _needs(one, one.name),
             _yes(learns_mass(one.name)),
             _yes(_reads_acceleration(one.name)),
@@ -106,14 +105,21 @@ def controllers() -> str:
         )
         for one in entries("controller")
     ]
-    heads = ("name", "what it is", "short for", "needs", "learns the mass", "reads acceleration", "compiled")
+    heads = ("name", "what it is", "needs", "learns the mass", "reads acceleration", "compiled")
     table = _table(heads, rows)
     policies = [
         (f"`{name}`", _needs(one, name), _yes(learns_mass(name)))
         for one in entries("policy")
         for name in [f"residual:{one.name}"]
     ]
-    return f"{table}\n\n{_table(('policy that comes with the package', 'needs', 'learns the mass'), policies)}"
+    short = [(f"`{one.name}`", whole) for one in entries("controller") if (whole := _short_for(one.name))]
+    return "\n\n".join(
+        [
+            table,
+            _table(("name", "short for"), short),
+            _table(("policy that comes with the package", "needs", "learns the mass"), policies),
+        ]
+    )
 
 
 def options(family: str) -> str:
