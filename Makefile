@@ -15,7 +15,7 @@
 # make devcontainer writes .devcontainer/, where VS Code and Codespaces look, from packaging/container
 # make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
 # make kernels builds the machine code that the package carries, at a release; between two, Numba compiles what was edited
-# make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
+# make targets builds the loop without Python for every target and writes docs/laboratory/targets.md (some minutes; qemu-user runs aarch64)
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -56,6 +56,9 @@ HONEST := circle_honest_apg
 LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
+# Films of docs/environments: environment, file, and the seconds that are shown; a file has less than 400 kB.
+FILMS := Circle-v2:circle:2:7 Probe-v3:probe:2:7 Descent-v2:descent:3:9 Forceps-v2:forceps:0.5:6.5 Dystocia-v2:dystocia:0.5:7 \
+  Vacuum-v1:vacuum:0.5:6.5 Rail-v0:rail:4:10 RailSteps-v0:rail-steps:3:10 RailStiffness-v0:rail-stiffness:7:14
 
 .PHONY: run figure test test-slow test-all quick test-weekly portable oldest fuzz mutation soak lint npm lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page kernels docs docs-links devcontainer golden clean
 
@@ -212,10 +215,9 @@ pictures: $(READY)
 	$(BIN)/birthsim identify --simulate $(OUT)/plan.csv --parameters $(OUT)/lab.toml --out $(OUT)/log.parquet
 	$(BIN)/birthsim identify $(OUT)/log.parquet --out $(OUT)/rig.toml --report $(OUT)/identify
 	cp $(OUT)/identify/residuals.svg docs/identify_residuals.svg
-	$(BIN)/birthsim animate --seed 1 --out docs/forceps.webp
 	$(BIN)/birthsim animate --env BirthSIM/Circle-v2 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
-	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v1 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
-	  --out docs/vacuum.webp
+	for film in $(FILMS); do set -- $$(echo $$film | tr : ' '); $(BIN)/birthsim animate --env BirthSIM/$$1 \
+	  --controller backstepping admittance-adaptive --sensors lab --seed 1 --rate 10 --begin $$3 --end $$4 --out docs/environments/$$2.webp || exit 1; done
 
 # Interrupted, the same command goes on. What is fresh is left as it is; birthsim study status has the seconds of each.
 results: $(READY)

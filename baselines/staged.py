@@ -84,8 +84,8 @@ class StagedController:
     Notes
     -----
     A controller derives from this class, returns its stages from ``controller_stages(sampled)`` and says in ``explain`` what
-    it refuses; docs/controllers.md shows one. A sample that is not finite is replaced by the last good one; ``missed`` counts
-    the periods, and ``protect`` chooses what happens then.
+    it refuses; docs/controllers/own.md shows one. A sample that is not finite is replaced by the last good one; ``missed``
+    counts the periods, and ``protect`` chooses what happens then.
 
     Examples
     --------

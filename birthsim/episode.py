@@ -31,14 +31,15 @@ def run(settings: "Settings") -> None:
     episode = record(env, settings.seed, FIELDS, "episode")
     # pyplot takes half a second to load.
     from baselines.figures.runs import episode_figure
+    from baselines.figures.style import drawn_for
 
     title = f"{settings.env}, {name}, seed {settings.seed}, {settings.sensors} sensors"
-    with whole_results(folder) as place:
-        episode_figure(episode, title, place)
+    with drawn_for(settings.style), whole_results(folder) as place:
+        files = [path.name for path in episode_figure(episode, title, place)]
     print("\n".join([title, "", *table(episode)]))
     if episode["lost"][-1]:
         print(f"\nlost after {episode['time'][-1]:.2f} s: a piston ran into its stop, or a chamber left its range")
-    print(f"\nwritten to {folder}/: episode.png, episode.svg")
+    print(f"\nwritten to {folder}/: {', '.join(files)}")
 
 
 def table(episode: dict[str, Array]) -> list[str]:

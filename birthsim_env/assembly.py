@@ -18,18 +18,21 @@ from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn, check_points
 from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
 from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
-from birthsim_env.parts.scenarios import find_scenario, rig_of
+from birthsim_env.parts.scenarios import Scenario, find_scenario, rig_of
 from birthsim_env.parts.sensors.model import drawn_by, models_that_draw
 from birthsim_env.parts.times import called, check_times
 from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.values import is_within, near, shown, whole_of
-from birthsim_env.registry import entry
+from birthsim_env.physics.rig.values import is_within, near, path_of, shown, whole_of
+from birthsim_env.registry import entry, names
 from birthsim_env.simulation import Simulation
 
 F = TypeVar("F", bound=Callable[..., Any])
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
+GIVEN = ("reference", "user_force", "stiffness")
+PARTS = ("trajectory", "user_force", "stiffness")
+"""The arguments by which a user gives parts of a scenario, and what a simulation calls these parts."""
 
 
 class Arguments(TypedDict, total=False):
@@ -109,9 +112,57 @@ def policy_periods(policy_period: float, parameters: Parameters) -> int:
 
 
 @dataclass(frozen=True)
+class Experiment:
+    """What episodes are drawn from: a ``scenario`` on a ``rig`` that ``sensors`` measure, with what a user has ``given`` in
+    place of its parts. They last ``duration`` s, which may be ``usual`` for the scenario.
+
+    ``randomize`` is what the environment was made with. Errors are those of ``assemble``.
+    """
+
+    scenario: Scenario
+    rig: Parameters
+    sensors: str
+    duration: float
+    usual: bool
+    given: Mapping[str, Any]
+    randomize: Any
+
+    def drawn(self, randomize: Any) -> tuple[dict[str, tuple[Any, ...]], bool]:
+        """What is drawn of the rig and its sensors, and whether the parts of the scenario are ``varied`` too."""
+        if isinstance(randomize, Mapping):
+            return checked_ranges(randomize, self.rig, self.sensors), False
+        one_of("randomize", randomize, RANDOMIZE)
+        ranges = checked_ranges(ranges_of(self.rig, randomize, self.sensors), self.rig, self.sensors)
+        if randomize == "sensors" and not drawn_by(self.sensors):
+            able = ", ".join(map(repr, models_that_draw()))
+            raise ValueError(f"randomize = 'sensors' with sensors = {self.sensors!r}; allowed: with sensors = {able}")
+        return ranges, randomize in (True, "scenario", "sensors")
+
+    def parts(self, varied: bool, changing: bool = False) -> dict[str, Any]:
+        """Target, hand and setpoints, by their names in a simulation; where they are ``changing``, without a user's own."""
+        reference, user_force, stiffness = given = tuple(self.given[name] for name in GIVEN)
+        own: dict[str, Any] = dict(zip(PARTS, (self.scenario.varied if varied else self.scenario.nominal)(), strict=True))
+        if changing:
+            named_hand = path_of(user_force) in names("hand")
+            own = {name: own[name] for name, one in zip(PARTS, given, strict=True) if one is None}
+            own |= {"user_force": hand_of(user_force, varied)} if named_hand else {}
+        else:
+            own["trajectory"] = own["trajectory"] if reference is None else trajectory_of(reference, self.duration)
+            own["user_force"] = own["user_force"] if user_force is None else hand_of(user_force, varied)
+            own["stiffness"] = own["stiffness"] if stiffness is None else stiffness_of(stiffness)
+            for name, one, part in zip(GIVEN, given, own.values(), strict=True):
+                check_times(name, one, part.timed, self.duration, self.usual)
+            check_points(called("reference", reference), own["trajectory"], self.duration, self.rig)
+        if "trajectory" in own:
+            check_drawn(own["trajectory"], self.duration, self.rig)
+        return own
+
+
+@dataclass(frozen=True)
 class Setup:
     """What an environment is made of."""
 
+    experiment: Experiment
     simulation: Simulation
     actuation: Actuation
     duration: float
@@ -139,7 +190,7 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     ``TypeError`` for arguments that there are not."""
     refuse_unknown(arguments)
     given: Arguments = {**DEFAULTS, **arguments}
-    randomize, actuation, duration = given["randomize"], given["actuation"], given["duration"]
+    actuation, duration = given["actuation"], given["duration"]
     rig = rig_of(scenario, given["parameters"])
     table = find_scenario(scenario).on(rig)
     valves = one_of("valves", given["valves"], VALVE_LAYOUTS)
@@ -154,36 +205,21 @@ def assemble(num_envs: int, scenario: str, **arguments: Unpack[Arguments]) -> Se
     for name, length, most in (("size", chosen.size, MOST_ACTIONS), ("memory_names", len(chosen.memory_names), MOST_SHOWN)):
         if not length <= most:
             raise ValueError(f"actuation.{name} has a length of {length}; allowed: at most {most}")
-    if isinstance(randomize, Mapping):
-        ranges, varied = checked_ranges(randomize, rig, sensors), False
-    else:
-        one_of("randomize", randomize, RANDOMIZE)
-        ranges = checked_ranges(ranges_of(rig, randomize, sensors), rig, sensors)
-        varied = randomize in (True, "scenario", "sensors")
-        if randomize == "sensors" and not drawn_by(sensors):
-            able = ", ".join(map(repr, models_that_draw()))
-            raise ValueError(f"randomize = 'sensors' with sensors = {sensors!r}; allowed: with sensors = {able}")
-    default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not is_within(duration, above=0.0, most=LONGEST):
         raise ValueError(f"duration = {shown(duration)}; allowed: None or a positive number, at most {LONGEST:g} (s)")
-    lasts = float(duration or table.duration)
-    trajectory = default_reference if given["reference"] is None else trajectory_of(given["reference"], lasts)
-    hand = default_force if given["user_force"] is None else hand_of(given["user_force"], varied)
-    stiffness = default_stiffness if given["stiffness"] is None else stiffness_of(given["stiffness"])
-    check_times("reference", given["reference"], trajectory.timed, lasts, duration is None)
-    check_times("user_force", given["user_force"], hand.timed, lasts, duration is None)
-    check_times("stiffness", given["stiffness"], stiffness.timed, lasts, duration is None)
-    check_points(called("reference", given["reference"]), trajectory, lasts, rig)
-    check_drawn(trajectory, lasts, rig)
+    lasts, own = float(duration or table.duration), {name: given[name] for name in GIVEN}  # type: ignore[literal-required]
+    experiment = Experiment(table, rig, sensors, lasts, duration is None, own, given["randomize"])
+    ranges, varied = experiment.drawn(given["randomize"])
     periods, threads = policy_periods(given["policy_period"], rig), threads_for(num_envs, given["num_threads"])
+    trajectory, hand, stiffness = experiment.parts(varied).values()
     parts = trajectory, hand, stiffness, sensors, chosen
     simulation = Simulation(num_envs, rig, ranges, *parts, periods, threads, given["force_sensor"])
     limit = observation.LIMIT
-    names = (*map(str, observation.entries_of(rig)), *(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
-    seen, acted = spaces.Box(-limit, limit, (len(names),), np.float32), spaces.Box(-1.0, 1.0, (chosen.size,), np.float32)
+    entries = (*map(str, observation.entries_of(rig)), *(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
+    seen, acted = spaces.Box(-limit, limit, (len(entries),), np.float32), spaces.Box(-1.0, 1.0, (chosen.size,), np.float32)
     size = checked_size("picture_size", given["picture_size"])
     how = lasts, float(given["policy_period"]), given["clip_actions"], table.title, size
-    return Setup(simulation, chosen, *how, seen, acted, names)
+    return Setup(experiment, simulation, chosen, *how, seen, acted, entries)
 
 
 def threads_for(num_envs: int, num_threads: int | None) -> int:

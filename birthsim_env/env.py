@@ -96,7 +96,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `randomize`: what every episode draws anew. `False`: nothing. `"plant"`: the rig, from ranges about the one described
       (`birthsim_env.parts.drawn.randomization`). `"scenario"`: the experiment. `True`: both. `"sensors"`: the experiment, and
       the parameters of realistic sensors (`honest`) alone. A mapping such as `{"mechanics.mass": (2, 5)}` draws just these
-      parameters.
+      parameters. `env.unwrapped.set_ranges` changes it for the episodes to come.
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
     - `user_force`: the hand, instead of the scenario's. A `UserForce`; a function of time, or of time, position and velocity,

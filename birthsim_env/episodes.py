@@ -1,5 +1,6 @@
 """What the single and the vector environment share: episodes of lanes, their seeds, rewards, observations and frames."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -16,7 +17,7 @@ from birthsim_env.physics.rig.arrays import floats_of
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.registry import register
 from birthsim_env.restored import Declared, Kept
-from birthsim_env.state import State, give_state, take_state
+from birthsim_env.state import State, give_state, plain_value, take_state
 
 if TYPE_CHECKING:
     from birthsim_env.drawing.rendering import Renderer
@@ -35,7 +36,12 @@ class Episodes:
     arrays: Any = np
     """The module of the arrays of lanes."""
 
-    in_state: ClassVar[Declared] = {"elapsed": COUNTED, "_numbers": COUNTED, "_seeds": Kept(least=0, whole=True)}
+    in_state: ClassVar[Declared] = {
+        "elapsed": COUNTED,
+        "_numbers": COUNTED,
+        "_seeds": Kept(least=0, whole=True),
+        "_complete": None,
+    }
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -45,6 +51,10 @@ class Episodes:
         self.elapsed: NDArray[np.int64] = np.zeros(lanes, dtype=np.int64)
         self._numbers: NDArray[np.int64] = np.full(lanes, -1, dtype=np.int64)
         self._seeds: list[int] = []
+        self._asked: Any = None
+        """What ``set_ranges`` was given last; None for what the environment was made with."""
+        self._complete = True
+        """Whether the parts have room for what they draw, and the lanes began in it."""
         self._outcome = Outcome(
             lanes,
             self.simulation.nominal,
@@ -81,15 +91,53 @@ class Episodes:
         """Whether episodes have begun, which makes room for what parts remember."""
         return bool(self._seeds)
 
+    def set_ranges(self, randomize: Any) -> None:
+        """Draw new episodes as if the environment had been made with this ``randomize``; see ``Face.set_ranges``."""
+        ranges, _ = self._setup.experiment.drawn(randomize)
+        self._draw(ranges if isinstance(randomize, Mapping) else randomize)
+
+    def _draw(self, asked: Any) -> None:
+        experiment = self._setup.experiment
+        before, now = (experiment.drawn(experiment.randomize if one is None else one) for one in (self._asked, asked))
+        parts = experiment.parts(now[1], changing=True) if now[1] != before[1] else {}
+        self._complete = self.simulation.draw(now[0], parts) and self._complete
+        self._asked, self._path = asked, None
+
+    def _draw_of_state(self, asked: Any) -> None:
+        try:
+            self._draw(asked)
+        except ValueError as error:
+            raise ValueError(f"state draws what this environment cannot: {error}") from error
+
+    def _require_begun(self, call: str) -> None:
+        """Raise ``RuntimeError`` where lanes must begin before this ``call``."""
+        if not self.begun:
+            raise RuntimeError(f"{call} before reset(): call reset(seed=...) first")
+        if not self._complete:
+            raise RuntimeError(
+                f"{call} after set_ranges(), which changed more than what is drawn: call reset() of all lanes first"
+            )
+
     def get_state(self, random: np.random.Generator, ended: NDArray[np.bool_] | None = None) -> State:
         """All that the future depends on, with what the environment keeps besides: its generator, and which lanes ended."""
-        if not self.begun:
-            raise RuntimeError("get_state() before reset(): call reset(seed=...) first")
+        self._require_begun("get_state()")
         return take_state(self._parts(random, ended))
 
     def set_state(self, state: State, random: np.random.Generator, ended: NDArray[np.bool_] | None = None) -> None:
-        """Go on from what ``get_state`` returned; episodes must have begun."""
-        give_state(self._parts(random, ended), state)
+        """Go on from what ``get_state`` returned, with the ranges of then; episodes must have begun."""
+        before, asked = (self._asked, self._complete), plain_value(state, "episodes._asked")
+        own = take_state(self._parts(random, ended)) if asked != self._asked else {}
+        try:
+            if own:
+                self._draw_of_state(asked)
+            give_state(self._parts(random, ended), state)
+        except ValueError:
+            if own:
+                self._draw(before[0])
+                give_state(self._parts(random, ended), own)
+                self._complete = before[1]
+            raise
+        self._complete = True
         self.simulation.forget_loops()
         self._path = None
 
@@ -114,6 +162,9 @@ class Episodes:
     def begin(self, lanes: Mask, options: dict[str, Any] | None = None, again: bool = False) -> None:
         """Start the next episode in the lanes of a mask (N,), or the present one ``again``."""
         position = start_of(options)
+        if not self._complete and not np.all(lanes):
+            self._require_begun("reset() of some lanes")
+        self._complete = True
         if not again:
             self._numbers[lanes] += 1
         self.elapsed[lanes] = 0
@@ -150,8 +201,8 @@ class Episodes:
 
     def step(self, actions: Array) -> tuple[Array, NDArray[np.bool_]]:
         """One policy step; returns terms of the reward and the reward, (6, N), and which lanes have left the physical range."""
-        if not self.begun:
-            raise RuntimeError("step() before reset(): call reset(seed=...) first")
+        if not (self._seeds and self._complete):
+            self._require_begun("step()")
         self.simulation.step(actions)
         self.elapsed += 1
         return self._outcome.terms.copy(), self._outcome.ends[0] > 0.0

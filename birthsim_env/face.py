@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import RENDER_MODES
+from birthsim_env.assembly import RENDER_MODES, Randomize
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.loop.pipeline import Pipeline
@@ -102,6 +102,40 @@ class Face:
                 self._np_random, self._np_random_seed = before
                 self._episodes.end()
             raise
+
+    def set_ranges(self, randomize: Randomize) -> None:
+        """From the next episode of each lane on draw worlds as if the environment had been made with this ``randomize``.
+
+        A curriculum needs no new environment: episodes that are under way go on to their end in the world that they have. After
+        ``reset(seed=s)`` all is bit-identical to a new environment with ``randomize`` and that seed. The ranges are a part of
+        ``get_state()``, and ``set_state`` brings back those of then.
+
+        Parameters
+        ----------
+        randomize : bool, str or mapping
+            As the argument of ``gymnasium.make``: a word, or dotted names of parameters with (low, high), SI units.
+
+        Raises
+        ------
+        ValueError
+            Names what cannot be drawn, and what is allowed, as ``gymnasium.make`` does; then nothing has changed.
+        NotImplementedError
+            Of lanes on a device.
+
+        Notes
+        -----
+        All lanes must be reset before the next step where something else changes with the ranges: the room for the largest
+        latency of ``honest`` sensors, or a scenario of a user's own. Until then ``step`` raises ``RuntimeError``.
+
+        Examples
+        --------
+        >>> import gymnasium as gym, birthsim_env
+        >>> worlds = gym.make_vec("BirthSIM/Circle-v2", num_envs=2, randomize={"mechanics.mass": (3.0, 3.0)})
+        >>> observations, infos = worlds.reset(seed=0)
+        >>> worlds.set_ranges({"mechanics.mass": (2.0, 5.0)})
+        >>> observations, infos = worlds.reset(seed=0)
+        """
+        self._episodes.set_ranges(randomize)
 
     @property
     def duration(self) -> float:

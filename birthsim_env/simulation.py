@@ -5,6 +5,8 @@ the valves, the plant moves, and then reference, hand and sensors are brought to
 compiled, and all periods of a policy step are one call; the loop stops only for what a user has written in Python.
 """
 
+from collections.abc import Collection, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
@@ -31,17 +33,18 @@ from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import check_knots, checked_start
 from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.streams import begin, worlds
+from birthsim_env.parts.drawn.taking_over import emptied, prepare, take_over
 from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors.model import SensorModel
+from birthsim_env.parts.sensors.model import SensorModel, drawn_by
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.linkage.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.values import plain
 from birthsim_env.physics.strength import require_carried
 from birthsim_env.registry import entry
-from birthsim_env.restored import Declared, is_own
+from birthsim_env.restored import Declared
 
 if TYPE_CHECKING:
     from birthsim_env.gradients.recorder import Pullback
@@ -59,6 +62,20 @@ class Closes(Protocol):
     def step(self) -> Step: ...
 
 
+def split(ranges: Ranges, names: Collection[str]) -> tuple[Ranges, Ranges]:
+    """Those of the ``ranges`` that have one of the ``names``, and the others."""
+    named = {name: bounds for name, bounds in ranges.items() if name in names}
+    return named, {name: bounds for name, bounds in ranges.items() if name not in named}
+
+
+def sensors_drawing(ranges: Ranges, sensors: str, electronics: Electronics, lanes: int) -> SensorModel:
+    """The model of this name, which draws ``ranges``."""
+    model: SensorModel = entry("sensors", sensors).made(electronics, lanes)
+    if ranges:
+        model.vary(ranges)
+    return model
+
+
 class Simulation(Parts):
     """``num_envs`` lanes under one actuation, at the ``Instant`` that ``begin`` and every ``step`` lead to.
 
@@ -66,7 +83,7 @@ class Simulation(Parts):
     ``force_sensor`` the measured force of the hand is zero. ``outcome`` closes a policy step, where there is one.
     """
 
-    in_state: ClassVar[Declared] = {"threads": None, "outcome": None, "start": None, "_order": None, "_known": None}
+    in_state: ClassVar[Declared] = dict.fromkeys(("threads", "outcome", "start", "_order", "_known", "_redrawn", "_of_sensors"))
 
     def __init__(
         self,
@@ -82,24 +99,22 @@ class Simulation(Parts):
         threads: int = 1,
         force_sensor: bool = True,
     ) -> None:
-        model: SensorModel = entry("sensors", sensors).made(parameters.electronics, num_envs)
+        of_sensors, of_rig = split(ranges, drawn_by(sensors))
+        model = sensors_drawing(of_sensors, sensors, parameters.electronics, num_envs)
         super().__init__(parameters, num_envs, trajectory, user_force, stiffness, model, actuation, periods)
         self.nominal = parameter_column(parameters)
-        of_sensors = {name: ranges[name] for name in ranges if name in model.drawn}
-        if of_sensors:
-            model.vary(of_sensors)
+        self._model, self._of_sensors = sensors, of_sensors
+        self.ranges: Ranges = of_rig
+        """What is drawn of the rig."""
+        self._redrawn = False
         for part in (trajectory, user_force, stiffness):
-            if is_own(type(part)):
-                vars(part).update({name: plain(value) for name, value in vars(part).items()})
-            part.prepare(num_envs)
+            prepare(part, num_envs)
         self.threads, self.force_sensor = threads, force_sensor
         self.outcome: Closes | None = None
         self.action: Array = np.zeros((actuation.size, num_envs))
         self._jumps: Array = np.zeros((5, num_envs))
         self.start: Array = np.zeros((Start.size, num_envs))
         """``Start`` of each lane."""
-        self.ranges: Ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
-        """What is drawn of the rig."""
         self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
         self._order: tuple[str, ...] | None = None
@@ -109,6 +124,25 @@ class Simulation(Parts):
         self._loop, self._look = None, None  # type: tuple[MixedLoop | None, MixedLoop | None]
         self.recorder: Runs | None = None
         """Runs policy steps in place of the loop, see ``birthsim_env.gradients``."""
+
+    def draw(self, ranges: Ranges, parts: Mapping[str, Any]) -> bool:
+        """From the next episode of each lane on draw ``ranges`` of the rig and its sensors, and let ``parts``, new ones by
+        their names here, take the place of those that are there.
+
+        Returns whether episodes that are under way can go on to their ends; else all lanes must begin anew.
+        """
+        of_sensors, self.ranges = split(ranges, drawn_by(self._model))
+        lanes, self._redrawn = self.plant.num_envs, True
+        empty = {name: emptied(getattr(self, name), lanes) for name in parts}
+        for part in parts.values():
+            prepare(part, lanes)
+        if of_sensors != self._of_sensors:
+            make = partial(sensors_drawing, sensors=self._model, electronics=self.parameters.electronics, lanes=lanes)
+            empty["sensors"], parts = make(self._of_sensors), {**parts, "sensors": make(of_sensors)}
+            self._of_sensors = of_sensors
+        goes_on = [take_over(getattr(self, name), empty[name], part) for name, part in parts.items()]
+        vars(self).update(parts)
+        return all(goes_on)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the loops, which know addresses."""
@@ -148,7 +182,7 @@ class Simulation(Parts):
         """
         chosen = np.flatnonzero(lanes)
         for block, streams in worlds(chosen, seeds, episodes):
-            if self.ranges:
+            if self.ranges or self._redrawn:
                 columns = draw_columns(self.parameters, self.ranges, streams["parameters"], len(block))
                 self.plant.lane_parameters[:, block] = columns
             begin(self.trajectory, block, streams["reference"])

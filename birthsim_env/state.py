@@ -34,6 +34,9 @@ from birthsim_env.restored import (
 
 State = dict[str, NDArray[Any]]
 
+BROKEN = (KeyError, AttributeError, TypeError, ValueError, IndexError, OverflowError, RecursionError, MemoryError)
+"""What reading a state raises that is none."""
+
 PLAIN = "plain"
 """Entry of a state for all that is no array: JSON, in bytes."""
 
@@ -69,6 +72,14 @@ def give_state(parts: dict[str, Any], state: State) -> None:
             raise _foreign(f"{name!r} {complaint}")
     for name, entry in entries.items():
         entry.put(given[name])
+
+
+def plain_value(state: State, name: str) -> Any:
+    """What a state says of ``name``, which is no array; None where it says nothing, or is none."""
+    try:
+        return _from_json(parse_json("state", state[PLAIN].tobytes(), dict, finite=False)[name])
+    except BROKEN:
+        return None
 
 
 @dataclass(frozen=True)
@@ -242,7 +253,7 @@ def _decoded(state: State) -> dict[str, Any]:
         plain = parse_json("state", state[PLAIN].tobytes(), dict, finite=False)
         arrays = {str(name): np.array(value) for name, value in state.items() if name != PLAIN}
         values = {name: _from_json(value) for name, value in plain.items()}
-    except (KeyError, AttributeError, TypeError, ValueError, IndexError, OverflowError, RecursionError, MemoryError) as error:
+    except BROKEN as error:
         raise _foreign(f"{PLAIN!r} is missing or damaged") from error
     twice = sorted(arrays.keys() & values.keys())
     if twice:

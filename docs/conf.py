@@ -52,26 +52,20 @@ mathjax_path = MATHJAX.name
 
 html_theme = "furo"
 html_title = "BirthSIM"
-html_favicon = html_logo = str(HERE.parent / "birthsim_live" / "page" / "icon.svg")
+LOGO = HERE.parent / "birthsim_live" / "page" / "icon.svg"
+ON_DARK = {"#0e3480": "#9db8f5", "#5c646e": "#b4bcc6"}
+"""Colours of the logo that a dark page would swallow -> what takes their place there."""
+html_favicon = str(LOGO)
 REPOSITORY = notebooks.repository()
 html_baseurl = f"https://{REPOSITORY.replace(chr(47), '.github.io/')}/" if REPOSITORY else ""
-html_theme_options = (
-    {
-        "footer_icons": [
-            {
-                "name": "Repository on GitHub",
-                "url": f"https://github.com/{REPOSITORY}",
-                "html": "Repository on GitHub",
-                "class": "",
-            }
-        ]
-    }
-    if REPOSITORY
-    else {}
-)
-html_static_path = ["_static", str(MATHJAX)]
+html_theme_options = {"light_logo": "icon.svg", "dark_logo": "icon_dark.svg"}
+if REPOSITORY:
+    named = "Repository on GitHub"
+    icon = {"name": named, "url": f"https://github.com/{REPOSITORY}", "html": named, "class": ""}
+    html_theme_options["footer_icons"] = [icon]
+html_static_path = ["_static", str(LOGO), str(MATHJAX), "pull.webp"]
 html_css_files = ["site.css"]
-html_js_files = ["access.js", "tables.js", "data.js", "words.js", "glossary.js"]
+html_js_files = ["access.js", "tables.js", "data.js", "words.js", "glossary.js", "disk.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
@@ -135,6 +129,17 @@ def build_words(app, exception):
         (app.outdir / "_static" / "words.js").write_text(words.script(), encoding="utf-8")
 
 
+def build_logo(app, exception):
+    """The logo for dark pages."""
+    if exception is None and app.builder.name == "html":
+        drawn = LOGO.read_text(encoding="utf-8")
+        for light, dark in ON_DARK.items():
+            if light not in drawn:
+                raise ValueError(f"{LOGO} has no {light}; allowed in ON_DARK: colours of the logo")
+            drawn = drawn.replace(light, dark)
+        (app.outdir / "_static" / "icon_dark.svg").write_text(drawn, encoding="utf-8")
+
+
 def build_rig(app, exception):
     """The folder of static files that runs the rig, beside the pages."""
     if exception is None and app.builder.name == "html":
@@ -152,6 +157,7 @@ def setup(app):
     app.connect("html-page-context", with_data)
     app.connect("html-page-context", with_card)
     app.connect("html-page-context", with_notebook)
+    app.connect("build-finished", build_logo)
     app.connect("build-finished", build_rig)
     app.connect("build-finished", build_words)
     app.connect("build-finished", build_notebooks)

@@ -22,6 +22,9 @@ Act = Callable[[NDArray[np.float32]], NDArray[np.floating]]
 them. One that remembers also has ``reset(lanes)``, which forgets the past of all lanes (None) or of those where the mask (N,)
 is True."""
 
+ROUNDING = 1e-6
+"""By how much an action may exceed 1 in size: onnxruntime's tanh does so by the last bit of single precision."""
+
 
 def spaces_of(rig: Parameters) -> tuple[int, int]:
     """Lengths of an observation and of an action in the environments of a rig."""
@@ -80,8 +83,8 @@ class ActingController:
             raise ValueError(f"policy {self._name} fails ({problem(error)}); {allowed}") from error
         if given.shape != expected:
             raise ValueError(f"policy {self._name} gives actions {given.shape}; {allowed}")
-        wrong = given[~(np.abs(given) <= 1.0)]
+        wrong = given[~(np.abs(given) <= 1.0 + ROUNDING)]
         if wrong.size:
             raise ValueError(f"policy {self._name} gives the action {shown(float(wrong[0]))}; {allowed}")
         # As single precision has them, which actions of an environment have.
-        return np.ascontiguousarray(given.astype(np.float32).T, dtype=np.float64)
+        return np.ascontiguousarray(np.clip(given, -1.0, 1.0).astype(np.float32).T, dtype=np.float64)

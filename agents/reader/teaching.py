@@ -168,6 +168,8 @@ def _restored(folder: Path, about: dict[str, Any], student: Differentiated, adam
     """How many updates a checkpoint holds, from which student and optimizer go on; 0 where there is none."""
 
     def restore(content: dict[str, Any]) -> dict[str, Any]:
+        if not 0 <= content["updates"] <= about["updates"]:
+            raise ValueError(f"updates = {content['updates']}; allowed: 0 to {about['updates']}")
         student.load_state_dict(tensors(content["student"]))
         state = {int(key): one for key, one in tensors(content["adam"]).items()}
         adam.load_state_dict({"state": state, "param_groups": adam.state_dict()["param_groups"]})

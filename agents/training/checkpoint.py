@@ -6,6 +6,7 @@ Arrays and JSON with a checksum of every byte (``agents.policy.sealed``): nothin
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from birthsim_env.physics.rig.values import problem, shown
 
 NAME = "checkpoint.safetensors"
 FORMAT = "birthsim-checkpoint-2"
+
+ALLOWED = "allowed: a checkpoint that birthsim train wrote"
 
 Content = dict[str, Any]
 
@@ -48,11 +51,10 @@ def read_checkpoint(
     path = folder / NAME
     if not path.is_file():
         return None
-    allowed = "allowed: a checkpoint that birthsim train wrote"
     try:
         arrays, about = unsealed(path.read_bytes(), FORMAT)
     except ValueError as error:
-        raise ValueError(f"{str(path)!r} is {error}; {allowed}") from error
+        raise ValueError(f"{str(path)!r} is {error}; {ALLOWED}") from error
     own = json.loads(json.dumps(settings))
     its = about["settings"] if isinstance(about.get("settings"), dict) else {}
     other = sorted(name for name in {*its, *own} if its.get(name) != own.get(name))
@@ -72,7 +74,7 @@ def read_checkpoint(
             undo(own_content)
             raise
     except (LookupError, TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError) as error:
-        raise ValueError(f"{str(path)!r} does not fit this version ({problem(error)}); {allowed}") from error
+        raise ValueError(f"{str(path)!r} does not fit this version ({problem(error)}); {ALLOWED}") from error
 
 
 def _flat(name: str, value: Any, arrays: Arrays) -> Any:
@@ -105,6 +107,8 @@ def _require_like(name: str, own: Any, value: Any, free: Sequence[str]) -> None:
             raise ValueError(f"{name} is {shown(value)}; allowed: finite {own.dtype} {own.shape}")
     elif type(value) is not type(own) or (isinstance(own, (list, dict)) and len(own) != len(value)):
         raise ValueError(f"{name} is {shown(value)}; allowed: {shown(own)}")
+    elif isinstance(own, float) and math.isfinite(own) and not math.isfinite(value):
+        raise ValueError(f"{name} is {shown(value)}; allowed: a finite number")
     elif isinstance(own, dict):
         for key, one in own.items():
             if key not in value:

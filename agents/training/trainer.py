@@ -18,6 +18,7 @@ from agents.training.configuration import TrainingSettings, algorithm_of
 from agents.training.events import EVENTS, Events, events_in
 from agents.training.interruption import WORDS, Interrupted
 from agents.training.margin import widened
+from agents.training.past import checked_past
 from agents.training.reached import Reached, described
 from agents.training.watch import Watch
 from birthsim_env.endings import one_signal_later
@@ -67,6 +68,8 @@ def train(
     learner = algorithm_of(settings.algorithm).learner(settings, envs, folder)
     began = time.perf_counter()
     past = learner.load(about)
+    if past is not None:
+        past = checked_past(past, settings, folder / CHECKPOINT)
     kept, watch = learner.steps if past is not None else None, None
 
     def there(steps: int) -> str:

@@ -3,13 +3,14 @@
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
@@ -18,12 +19,15 @@ from baselines.work.asked import asked, note
 from baselines.work.calls import called_by
 from baselines.work.definitions import take_stock
 from baselines.work.side_by_side import side_by_side
-from birthsim_env.endings import later_signals
-from birthsim_env.files import finite, write_json
+from birthsim_env.endings import later_signals, one_signal_later
+from birthsim_env.files import finite, temporary_folder, write_json
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
 
 Result = dict[str, Any]
+
+WORDS = "it ends once what runs has kept what it has; once more: at once"
+"""Said when a signal asks work to end whose pieces keep more than their results."""
 
 MOST = 2**28
 """Bytes of a piece; those with a trace of 64 episodes have a few million."""
@@ -35,8 +39,9 @@ _PIECE = {"code": dict, "used": Each(str), "result": dict, "sha256": str}
 class Task:
     """One piece: ``work(**settings)`` of a module's function gives its result; settings and result are JSON.
 
-    ``name`` begins the name of its file below the folder. Where it ``keeps`` something between kills, ``work`` gets a folder of
-    its own for that, ``place``, which is no part of the settings.
+    ``name`` begins the name of its file below the folder. Where it ``keeps`` something between kills, ``work`` also gets a
+    folder of its own for that, ``place``, and the path of a file, ``ending``, or None. Once there is such a file it shall keep
+    what it has, and raise. Neither is a part of the settings.
     """
 
     name: str
@@ -66,19 +71,24 @@ def run_tasks(
 
     A piece is taken from the folder where its settings and ``code_stamp`` are those of now; the screen says how many are.
     ``jobs`` processes work side by side, or those of a ``cluster``, as ``side_by_side`` says; the caller has the folder to
-    itself, by ``own_folder``. An interrupt keeps the complete pieces.
+    itself, by ``own_folder``. An interrupt keeps the complete pieces, and comes once those that run beside each other have
+    ended, where some of them keep more; a second one comes at once.
     """
     take_stock()
     paths = {task.name: folder / task.file() for task in tasks}
     results = {task.name: result for task in tasks if (result := _read(paths[task.name], task)) is not None}
     missing = [task for task in tasks if task.name not in results]
     failures: dict[str, str] = {}
+    ended: list[str] = []
     if results:
         print(f"{title}: {len(results)} of {len(tasks)} are there with these settings, rig and code, and are kept")
     with tqdm(total=len(tasks), initial=len(results), desc=title, unit=" pieces", disable=not missing) as bar:
 
-        def take(number: int, outcome: tuple[Result, dict[str, str]] | str) -> None:
+        def take(number: int, outcome: tuple[Result, dict[str, str]] | str | Ended) -> None:
             task = missing[number]
+            if isinstance(outcome, Ended):
+                ended.append(outcome.said)
+                return
             if isinstance(outcome, tuple):
                 # A signal in between would leave a file that the last line does not count.
                 with later_signals():
@@ -90,9 +100,15 @@ def run_tasks(
             bar.update()
 
         try:
-            side_by_side(_attempt, [(task, paths[task.name].with_suffix("")) for task in missing], jobs, take, cluster)
+            waits = cluster is None and min(jobs, len(missing)) > 1 and any(task.keeps for task in missing)
+            with _ending(waits) as ending:
+                pieces = [(task, paths[task.name].with_suffix(""), ending) for task in missing]
+                side_by_side(_attempt, pieces, jobs, take, cluster)
+            if ended:
+                raise OSError("work was asked to end; what is complete is kept, and the same command goes on")
         except KeyboardInterrupt:
             bar.close()
+            print(*filter(None, ended), sep="\n", end="\n" * any(ended))
             print(f"{title}: {len(results)} of {len(tasks)} are complete and kept; the same command goes on")
             raise
     return {task.name: results[task.name] for task in tasks if task.name in results}, failures
@@ -136,9 +152,31 @@ def _digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _attempt(task: Task, place: Path) -> tuple[Result, dict[str, str]] | str:
+class Ended(NamedTuple):
+    """A piece that ended early because that was asked for, with what it ``said``."""
+
+    said: str
+
+
+@contextmanager
+def _ending(waits: bool) -> Iterator[Path | None]:
+    """The file that asks pieces to end, which the first signal that asks this process to end makes, if this ``waits``."""
+    if not waits:
+        yield None
+        return
+    with temporary_folder() as folder:
+        ending = folder / "ending"
+        with one_signal_later(WORDS, ending.touch):
+            yield ending
+
+
+def _attempt(task: Task, place: Path, ending: Path | None) -> tuple[Result, dict[str, str]] | str | Ended:
     """The result and the entries asked for, or what went wrong in words: one that fails must not cost the others' results."""
+    if ending and ending.exists():
+        return Ended("")
     try:
-        return task.work(**task.settings, **({"place": str(place)} if task.keeps else {})), asked()
+        return task.work(**task.settings, **({"place": str(place), "ending": ending} if task.keeps else {})), asked()
     except Exception as error:
+        if ending and ending.exists():
+            return Ended(str(error))
         return f"{type(error).__name__}: {error}"

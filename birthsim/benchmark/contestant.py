@@ -14,14 +14,25 @@ from birthsim.benchmark.pieces import score_piece
 from birthsim.benchmark.suites import BenchmarkTask
 from birthsim_env.extras import installation
 from birthsim_env.parts.own_parts import from_file
+from birthsim_env.physics.rig.json_reading import read_json
+from birthsim_env.physics.rig.schema import Listed
 from birthsim_env.physics.rig.values import near, path_of, shown
 from birthsim_env.registry import names
+
+ONNX = "ONNX"
+"""Kind of a policy in an ONNX file."""
 
 WEIGHTS = "policy.safetensors"
 """What a folder of ``birthsim train`` has of a policy."""
 
-PLACE = "{task}"
-"""What stands for the task's name in a policy that is another one in each task."""
+PLACES = ("{task}", "{scenario}")
+"""What stands for a task's name, or for that of its scenario, in a policy that is another one in each."""
+
+TRAINING = "training.json"
+"""What a folder of ``birthsim train`` says of the training."""
+
+_POINT = {"steps": int, "seconds": float}
+_TRAINED = {"settings": dict, "steps?": int, "seconds?": float, "curve?": Listed(_POINT)}
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,16 @@ class Contestant:
     policy_period: float = 0.01
     normalize: str = ""
     run: int = 0
+
+    @property
+    def said(self) -> str:
+        """What was asked for, without the folder where it lies."""
+        return Path(self.given).name if self.has_file else self.name
+
+    @property
+    def differs(self) -> bool:
+        """Whether it is another one in each task."""
+        return self.has_file and any(place in self.given for place in PLACES)
 
     @property
     def has_file(self) -> bool:
@@ -87,11 +108,35 @@ class Contestant:
             return read_policy_file(self._place(task), rig, self.policy_period, self.normalize)
         return acting_controller(self.given, rig, self.policy_period, self.name)
 
+    def training(self, task: BenchmarkTask) -> dict[str, Any] | None:
+        """How its policy of a task was trained, as ``training_of`` says; of ONNX what stands in ``FILE.json`` beside it."""
+        if self.kind == RESIDUAL:
+            return training_of(self._folder(task) / TRAINING)
+        return training_of(Path(self._place(task)).with_suffix(".json")) if self.kind == ONNX else None
+
     def _folder(self, task: BenchmarkTask) -> Path:
         return folders_of(self._place(task))[self.run]
 
     def _place(self, task: BenchmarkTask) -> str:
-        return str(self.given).replace(PLACE, task.name)
+        return in_task(self.given, task)
+
+
+def in_task(given: Any, task: BenchmarkTask) -> str:
+    """A policy's path or name in a task."""
+    return str(given).replace(PLACES[0], task.name).replace(PLACES[1], task.scenario)
+
+
+def training_of(file: Path) -> dict[str, Any] | None:
+    """What a training says of itself, without the rig: ``settings``, ``steps`` of the policy over all lanes and ``seconds``.
+
+    None without such a file; ``ValueError`` for one that is damaged.
+    """
+    if not file.is_file():
+        return None
+    found = read_json("training", file, _TRAINED)
+    last = (found.get("curve") or [found])[-1]
+    settings = {name: value for name, value in found["settings"].items() if name not in ("rig", "teacher")}
+    return {"settings": settings, "steps": last.get("steps"), "seconds": last.get("seconds")}
 
 
 def contestants_of(policy: Any, task: BenchmarkTask, policy_period: float, normalize: str) -> list[Contestant]:
@@ -99,7 +144,7 @@ def contestants_of(policy: Any, task: BenchmarkTask, policy_period: float, norma
     one = _contestant_of(policy, task, policy_period, normalize)
     if one.kind != RESIDUAL:
         return [one]
-    folders = folders_of(one.given.replace(PLACE, task.name))
+    folders = folders_of(in_task(one.given, task))
     if len(folders) == 1:
         return [one]
     return [replace(one, name=f"{one.name} {own.name}", run=k) for k, own in enumerate(folders)]
@@ -123,10 +168,10 @@ def _contestant_of(policy: Any, task: BenchmarkTask, policy_period: float, norma
         if found is None:
             raise ValueError(f"policy = {shown(policy)}; allowed: {ALLOWED}")
         return Contestant(_called(found), "policy", found, policy_period)
-    place = text.replace(PLACE, task.name)
+    place = in_task(text, task)
     own = Contestant(Path(text).name or text, "controller", text, policy_period, normalize)
     if Path(place).suffix in SUFFIXES:
-        return replace(own, kind=algorithm_in(Path(place)) if place.endswith(SUFFIXES[0]) else "ONNX")
+        return replace(own, kind=algorithm_in(Path(place)) if place.endswith(SUFFIXES[0]) else ONNX)
     if normalize:
         raise ValueError(f"normalize = {shown(normalize)} with policy = {shown(text)}; allowed: with FILE.zip")
     if place.rpartition(":")[0].endswith(".py"):

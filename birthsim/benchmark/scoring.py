@@ -12,10 +12,10 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.work.tasks import Result, run_tasks
-from birthsim.benchmark.contestant import PLACE, Contestant, contestants_of
+from birthsim.benchmark.contestant import Contestant, contestants_of
 from birthsim.benchmark.pieces import score_under
 from birthsim.benchmark.row import overall, table, task_row
-from birthsim.benchmark.suites import BenchmarkTask, find_suite, task_of
+from birthsim.benchmark.suites import TASKS, BenchmarkTask, find_suite, find_task, task_of
 from birthsim.command_line.settings import EPISODES, JOBS_AT_MOST, LARGEST_SEED
 from birthsim.command_line.worlds import check_environment
 from birthsim_env.files import make_folder, own_folder, whole_results, write_json
@@ -23,13 +23,16 @@ from birthsim_env.physics.rig.values import checked_count, path_of, shown
 from birthsim_env.registry import names
 from birthsim_env.splits import GUIDING, TEST, VALIDATION, caution, first_seed, split_of
 
-FORMAT = "birthsim-score-1"
+FORMAT = "birthsim-score-2"
 
 NAME = "score.json"
 """The file of a row."""
 
 ENVIRONMENT = "BirthSIM/Circle-v2"
 """Where neither an environment nor a suite is asked for."""
+
+BOTH = "all"
+"""Every task of both suites."""
 
 SENSORS = "ideal"
 """Where none are asked for."""
@@ -45,8 +48,8 @@ class Scored:
     Parameters
     ----------
     row : dict
-        As JSON takes it, ready for a leaderboard: ``entry``, ``kinds``, hashes of files, ``split``, ``tasks`` with ``score``,
-        ``success`` on feasible worlds, ``error_mm`` and their 95 % intervals, and ``overall``. docs/benchmark.md lists all.
+        As JSON takes it, ready for the leaderboard: ``entry``, ``kinds``, hashes of files, ``split``, ``tasks`` with ``score``,
+        ``success``, ``error_mm`` and their 95 % intervals, and ``overall``. docs/benchmark.md lists all.
 
     Examples
     --------
@@ -73,6 +76,7 @@ class Plan:
     suite: str
     seeds: range
     entry: str
+    given: list[str]
 
     @property
     def learned(self) -> bool:
@@ -87,6 +91,7 @@ def score(
     sensors: str = SENSORS,
     force_sensor: bool = True,
     suite: str | None = None,
+    tasks: Sequence[str] | None = None,
     episodes: int = 64,
     seed: int | str = TEST.name,
     policy_period: float = 0.01,
@@ -103,16 +108,18 @@ def score(
     policy : str, path, object, or list of them
         The name of a controller or of a trained policy, ``"file.py:Name"``, a folder that ``train`` wrote, an archive ``.zip``
         of Stable-Baselines3, a file ``.onnx``; a model of Stable-Baselines3, a controller, or a function from observations
-        (N, D) to actions (N, n). Several are the training seeds of one entry, as are those of a folder. ``{task}`` in a path
-        stands for the task's name, where each task has a policy of its own.
+        (N, D) to actions (N, n). Several are the training seeds of one entry, as are those of a folder. ``{task}`` in a path or
+        name stands for the task's name and ``{scenario}`` for that of its scenario, where each has a policy of its own.
     environment : str, optional
-        An id, else ``"BirthSIM/Circle-v2"``; without ``suite``.
+        An id, else ``"BirthSIM/Circle-v2"``; without ``suite`` and ``tasks``.
     sensors : str
         The sensor model of that environment.
     force_sensor : bool
         Whether the hand's force is measured there.
     suite : str, optional
-        ``"classic"`` or ``"open"``, whose tasks say all of that.
+        ``"classic"``, ``"open"`` or ``"all"``, both; their tasks say all of that.
+    tasks : list of str, optional
+        Names of tasks of these suites, instead of a whole one.
     episodes : int
         Worlds of each task.
     seed : int or str
@@ -156,7 +163,7 @@ def score(
     >>> abs(scored.row["tasks"][0]["score"]["value"]) < 10
     True
     """
-    own = plan(policy, environment, sensors, force_sensor, suite, episodes, seed, policy_period, normalize, name)
+    own = plan(policy, environment, sensors, force_sensor, suite, tasks, episodes, seed, policy_period, normalize, name)
     jobs = checked_count("jobs", jobs, 1, JOBS_AT_MOST)
     if said := caution(own.seeds, GUIDING if own.learned else (VALIDATION,)):
         warnings.warn(said.replace("--seed ", "seed = "), stacklevel=2)
@@ -172,6 +179,7 @@ def plan(
     sensors: str,
     force_sensor: bool,
     suite: str | None,
+    tasks: Sequence[str] | None,
     episodes: int,
     seed: int | str,
     policy_period: float,
@@ -181,27 +189,41 @@ def plan(
     """Who is judged, and where; ``ValueError`` names what cannot be."""
     episodes = checked_count("episodes", episodes, 1, EPISODES)
     first = checked_count("seed", first_seed(seed), 0, LARGEST_SEED)
-    if suite is not None and environment is not None:
-        raise ValueError(f"environment = {shown(environment)} with suite = {shown(suite)}; allowed: one of them")
-    if suite is not None and (sensors != SENSORS or force_sensor is not True):
-        said = f"sensors = {shown(sensors)}, force_sensor = {shown(force_sensor)} with suite = {shown(suite)}"
-        raise ValueError(f"{said}; allowed: without them, each task of a suite has its own")
-    if suite is None:
-        check_environment(environment or ENVIRONMENT, given="environment =")
-        tasks: tuple[BenchmarkTask, ...] = (task_of(environment or ENVIRONMENT, sensors, force_sensor),)
-    else:
-        tasks = find_suite(suite)
+    where = _tasks(environment, sensors, force_sensor, suite, tasks)
     given = list(policy) if isinstance(policy, list | tuple) else [policy]
     if not given:
         raise ValueError("policy = []; allowed: one or more policies")
     statistics = "" if normalize is None else path_of(normalize)
     if statistics is None:
         raise ValueError(f"normalize = {shown(normalize)}; allowed: None or the path of a file")
-    every = [one for each in given for one in contestants_of(each, tasks[0], policy_period, statistics)]
+    found = [contestants_of(each, where[0], policy_period, statistics) for each in given]
+    every = [one for own in found for one in own]
     for one in every:
-        for task in tasks if one.has_file and PLACE in one.given else tasks[:1]:
+        for task in where if one.differs else where[:1]:
             one.controller(task)
-    return Plan(every, tasks, suite or "", range(first, first + episodes), name or every[0].name)
+    said = [own[0].said for own in found]
+    return Plan(every, where, suite or "", range(first, first + episodes), name or every[0].name, said)
+
+
+def _tasks(
+    environment: str | None, sensors: str, force_sensor: bool, suite: str | None, tasks: Sequence[str] | None
+) -> tuple[BenchmarkTask, ...]:
+    """Where a policy is judged: one environment, a suite, or named tasks."""
+    given = {"environment": environment, "suite": suite, "tasks": tasks}
+    several = [f"{name} = {shown(value)}" for name, value in given.items() if value is not None]
+    if len(several) > 1:
+        raise ValueError(f"{' with '.join(several)}; allowed: one of them")
+    if environment is None and several and (sensors != SENSORS or force_sensor is not True):
+        said = f"sensors = {shown(sensors)}, force_sensor = {shown(force_sensor)} with {several[0]}"
+        raise ValueError(f"{said}; allowed: without them, each task of a suite has its own")
+    if suite is not None:
+        return tuple(TASKS.values()) if suite == BOTH else find_suite(suite)
+    if tasks is not None:
+        if isinstance(tasks, str) or not tasks or len(set(tasks)) < len(tasks):
+            raise ValueError(f"tasks = {shown(tasks)}; allowed: a list of names of tasks, each once")
+        return tuple(map(find_task, tasks))
+    check_environment(environment or ENVIRONMENT, given="environment =")
+    return (task_of(environment or ENVIRONMENT, sensors, force_sensor),)
 
 
 def judge(plan: Plan, folder: Path | None, jobs: int, cluster: str | None, progress: bool) -> Scored:
@@ -258,6 +280,7 @@ def _row(plan: Plan, found: Sequence[Sequence[Result]]) -> Scored:
         {
             "format": FORMAT,
             "entry": plan.entry,
+            "given": plan.given,
             "policies": [one.name for one in plan.contestants],
             "kinds": [one.kind for one in plan.contestants],
             "sha256": [[one.hash(task) for one in plan.contestants] for task in plan.tasks],
@@ -266,8 +289,9 @@ def _row(plan: Plan, found: Sequence[Sequence[Result]]) -> Scored:
             "seed": plan.seeds.start,
             "episodes": len(plan.seeds),
             "policy_period": [one.policy_period for one in plan.contestants],
+            "training": [one.training(plan.tasks[0]) for one in plan.contestants],
             "tasks": rows,
-            "overall": overall(plan.tasks, found),
+            "overall": overall(rows),
             "seconds": round(sum(sum(one["seconds"]) for one in rows), 1),
             "versions": {"birthsim": birthsim_env.__version__, "python": platform.python_version(), **_versions()},
         }

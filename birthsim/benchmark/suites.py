@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from baselines.estimation.rig_filter import TOLD
+from birthsim.benchmark.scale import ends
 from birthsim_env.assembly import one_of
 from birthsim_env.ids import rig_for
 from birthsim_env.parts.drawn.frictions import with_friction
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import near, shown
-from birthsim_env.registry import entry
-from birthsim_env.scores import SENSORS, is_scored
+from birthsim_env.registry import entry, names
 
 WIDE = {name: list(bounds) for name, bounds in TOLD.items()}
 """Ranges of rigs far beyond those of training: 1 to 10 kg, 4 to 9 bar, and bores, friction, lag and dead volume."""
@@ -69,9 +69,14 @@ class BenchmarkTask:
         return {name: value for name, value in chosen.items() if value != usual[name]}
 
     @property
+    def scenario(self) -> str:
+        """The name of the scenario of its environment."""
+        return next(one for one in names("scenario") if environment_id(one) == self.environment)
+
+    @property
     def is_scored(self) -> bool:
         """Whether there is a scale of scores for it."""
-        return not self.options and self.sensors in SENSORS and is_scored(self.environment)
+        return ends(self.name) is not None
 
 
 def _tasks(scenarios: str, sensors: str, suffix: str = "", **options: Any) -> tuple[BenchmarkTask, ...]:
@@ -95,6 +100,9 @@ SUITES: dict[str, tuple[BenchmarkTask, ...]] = {
 }
 """Name -> tasks. A change of a suite takes a new name."""
 
+TASKS = {one.name: one for tasks in SUITES.values() for one in tasks}
+"""Name -> task, of every suite."""
+
 
 def find_suite(name: str) -> tuple[BenchmarkTask, ...]:
     """The tasks of a suite; ``ValueError`` names those that there are."""
@@ -104,10 +112,18 @@ def find_suite(name: str) -> tuple[BenchmarkTask, ...]:
     return SUITES[name]
 
 
+def find_task(name: str) -> BenchmarkTask:
+    """The task of a name; ``ValueError`` names those that there are."""
+    if not isinstance(name, str) or name not in TASKS:
+        asked = near(name, TASKS) if isinstance(name, str) else ""
+        raise ValueError(f"task = {shown(name)}{asked}; allowed: {', '.join(TASKS)}")
+    return TASKS[name]
+
+
 def task_of(environment: str, sensors: str, force_sensor: bool) -> BenchmarkTask:
     """A single task, as it is called in a suite where it is in one."""
     own = BenchmarkTask("", environment, entry("sensors", sensors).name, one_of("force_sensor", force_sensor, (True, False)))
-    for task in (one for tasks in SUITES.values() for one in tasks):
+    for task in TASKS.values():
         if (task.environment, task.world) == (own.environment, own.world):
             return task
     name = environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()

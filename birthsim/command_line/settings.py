@@ -115,6 +115,10 @@ Friction = Annotated[
 ]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
 RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
+Style = Annotated[
+    Literal["screen", "paper"],
+    Parameter(help="For a screen, as PNG and SVG; or for a paper: a column wide, without titles, letters of 8 pt, as PDF."),
+]
 MANY = Parameter(consume_multiple=True)
 """An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")

@@ -10,7 +10,7 @@ from PIL import Image
 import birthsim_env
 from baselines.named import make_controller
 from baselines.tables import aligned
-from birthsim.command_line.settings import Configured, Controller, RigFile, Sensors, Set
+from birthsim.command_line.settings import Configured, Controller, RigFile, Sensors, Set, Style
 from birthsim.command_line.worlds import with_options
 from birthsim.recorded import driven, record
 from birthsim_env.files import make_folder, whole_file, whole_results, write_json
@@ -36,8 +36,9 @@ class Settings(Configured):
     set: Set = field(default_factory=list)
     sensors: Sensors = "ideal"
     parameters: RigFile = None
+    style: Style = "screen"
     out: Path
-    """Folder for figure4.png and .svg, figure4.json, rig.png."""
+    """Folder for the figure, figure4.json and rig.png."""
 
 
 def record_run(
@@ -85,11 +86,12 @@ def main(settings: Settings) -> None:
     make_controller(controller, rig)
     folder = make_folder(settings.out)
     from baselines.figures.runs import figure4
+    from baselines.figures.style import drawn_for
 
-    with whole_results(folder) as place:
+    with drawn_for(settings.style), whole_results(folder) as place:
         record = record_run(controller, settings.sensors, rig, place / "rig.png")
         result = metrics_of(record, rig)
-        figure4(record, place)
+        files = [path.name for path in figure4(record, place)]
         write_json(place / "figure4.json", result)
     if result["lost"]:
         raise ValueError(
@@ -100,4 +102,4 @@ def main(settings: Settings) -> None:
     print(f"Fig. 4 with {controller}, {settings.sensors} sensors, {result['duration_s']:g} s\n")
     rows = [(name, *(f"{value:.3f}" for value in values)) for name, values in result.items() if isinstance(values, list)]
     print(aligned(("", "x or 1", "y or 2"), rows))
-    print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json, rig.png")
+    print(f"\nwritten to {folder}/: {', '.join(files)}, figure4.json, rig.png")

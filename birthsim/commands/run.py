@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from birthsim.command_line.settings import Controller, Env, Parts, Randomize, RigFile, Seed, Sensors, Set
+from birthsim.command_line.settings import Controller, Env, Parts, Randomize, RigFile, Seed, Sensors, Set, Style
 
 
 @dataclass(kw_only=True)
@@ -19,8 +19,9 @@ class Settings(Parts):
     randomize: Randomize = "none"
     """What the seed draws."""
     parameters: RigFile = None
+    style: Style = "screen"
     out: Path
-    """Folder for episode.png and .svg."""
+    """Folder for the figure of the episode."""
 
 
 def main(settings: Settings) -> None:

@@ -11,20 +11,22 @@ from birthsim.command_line.settings import EPISODES, MANY, WORLD, Processes, Sen
 
 @dataclass(kw_only=True)
 class Settings(Processes):
-    """Judge policies: score, success on feasible worlds and settled error, with 95 % intervals, and a row for the leaderboard.
+    """Judge policies: score, success and settled error on feasible worlds, with 95 % intervals, and a row for the leaderboard.
 
     A policy is FILE.zip of Stable-Baselines3 (PPO, SAC, TQC, RecurrentPPO), a folder that birthsim train wrote, FILE.onnx,
     path/to/file.py:Name, or the name of a controller or of a policy of the package. Several are training seeds of one entry. In
-    a suite {task} stands for the task's name, where each task has a policy of its own. Stable-Baselines3's loader unpickles
-    archives, so that they may run code of whoever made them.
+    a suite {task} stands for the task's name and {scenario} for that of its scenario, where each has a policy of its own.
+    Stable-Baselines3's loader unpickles archives, so that they may run code of whoever made them.
 
     The folder keeps what is complete: after Ctrl-C or a kill the same command goes on.
     """
 
     policy: Annotated[list[str], MANY, Parameter(metavar="POLICY...")] = field(kw_only=False)
     """What is judged."""
-    suite: Annotated[Literal["classic", "open"] | None, Parameter(group=WORLD)] = None
-    """Every task of a suite, instead of one environment."""
+    suite: Annotated[Literal["classic", "open", "all"] | None, Parameter(group=WORLD)] = None
+    """Every task of a suite, or of all, instead of one environment."""
+    tasks: Annotated[list[str] | None, MANY, Parameter(group=WORLD, metavar="TASK...")] = None
+    """Tasks of the suites by their names, instead of a whole suite."""
     env: Annotated[str | None, Parameter(group=WORLD, metavar="ID", help="Environment, else BirthSIM/Circle-v2.")] = None
     sensors: Sensors = "ideal"
     no_force_sensor: Annotated[bool, Parameter(group=WORLD)] = False
@@ -50,8 +52,10 @@ def main(settings: Settings) -> None:
     from birthsim_env.splits import TEST
 
     force_sensor, seed = not settings.no_force_sensor, TEST.first if settings.seed is None else settings.seed
-    world = settings.env, settings.sensors, force_sensor, settings.suite, settings.episodes, seed
+    world = settings.env, settings.sensors, force_sensor, settings.suite, settings.tasks, settings.episodes, seed
     own = plan(settings.policy, *world, settings.policy_period, settings.normalize, settings.name)
     warn_of_worlds(settings.policy, seed, settings.episodes)
     scored = judge(own, settings.out, settings.jobs, settings.cluster, True)
+    if not all(task.is_scored for task in own.tasks):
+        print("no score: only tasks of the suites have a scale")
     print(f"{scored}\n\nwritten to {settings.out}/: {NAME}")

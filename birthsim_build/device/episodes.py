@@ -136,6 +136,9 @@ class DeviceEpisodes(Episodes):
         rows: Array = self.there(self._outcome.rows).copy()
         return rows
 
+    def set_ranges(self, randomize: Any) -> NoReturn:
+        raise NotImplementedError("set_ranges() of lanes on a device, whose code draws the ranges; allowed: without device=")
+
     def get_state(self, *_: Any) -> NoReturn:
         raise NotImplementedError("get_state() of lanes on a device; allowed: without device=")
 

@@ -12,9 +12,9 @@ import gymnasium
 import numpy as np
 
 from agents.residual.settings import NO_LAW, ResidualSettings
-from agents.training.lanes import STIFFNESS, observations
+from agents.training.by_gradients.lanes import STIFFNESS, observations
+from agents.training.by_gradients.policy_gradient import LEAST, LEAST_RATE, MET, MOMENTS, OBSERVED
 from agents.training.margin import widened
-from agents.training.policy_gradient import LEAST, LEAST_RATE, MET, MOMENTS, OBSERVED
 from agents.training.validation import TRAINING_SEED
 from baselines.network import CLIP, EPSILON
 from birthsim_build.building import write_wasm
@@ -97,7 +97,7 @@ def write_learning(folder: Path) -> None:
 
 
 def _statistics(size: int) -> tuple[Array, Array]:
-    """Mean and standard deviation (``size``,) of observations, as of ``agents.training.policy_gradient``."""
+    """Mean and standard deviation (``size``,) of observations, as of ``agents.training.by_gradients.policy_gradient``."""
     alone = ResidualSettings(law=NO_LAW).to_dict()
     env: Any = gymnasium.make_vec("BirthSIM/CircleResidual-v2", num_envs=1, randomize=True, **alone)
     _, found = observations(env, TRAINING_SEED, OBSERVED)

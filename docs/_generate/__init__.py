@@ -6,19 +6,20 @@
 from functools import partial
 from pathlib import Path
 
+from _generate import environments
 from _generate.api import api
-from _generate.benchmark import splits, suites
-from _generate.commands import commands
-from _generate.controllers import controllers
+from _generate.benchmark import records, splits, suites
+from _generate.commands import commands, readers
+from _generate.configurations import configurations
+from _generate.controllers import FAMILIES, controllers, guarding
+from _generate.controllers import options as controller_options
 from _generate.drives import faults, provoked
-from _generate.environments import environments
 from _generate.metrics import metrics
 from _generate.page import page
-from _generate.pictures import pictures
 from _generate.pipeline import pipeline
-from _generate.readers import readers
+from _generate.policies import policies
 from _generate.rig import options, rig
-from _generate.root_pages import PAGES, root_page
+from _generate.root_pages import PAGES, bibtex, root_page
 from _generate.stages import stage
 
 PARTS = {
@@ -26,29 +27,33 @@ PARTS = {
     "api_birthsim_env.md": partial(api, "birthsim_env"),
     "api_baselines.md": partial(api, "baselines"),
     "api_agents.md": partial(api, "agents"),
+    "bibtex.md": bibtex,
     "commands.md": commands,
+    "configurations.md": configurations,
     "controllers.md": controllers,
-    "environments.md": environments,
+    **{f"controllers_{family}.md": partial(controller_options, family) for family in FAMILIES},
     "faults.md": faults,
+    "guarding.md": guarding,
     "metrics.md": metrics,
     "options.md": options,
     "page.md": page,
     "pipeline.md": pipeline,
+    "policies.md": policies,
     "provoked.md": provoked,
     "readers.md": readers,
     "rig.md": rig,
+    **records(),
     "splits.md": splits,
     "suites.md": suites,
+    **environments.PARTS,
     **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},
 }
 """File -> what returns its text."""
 
 
 def write(folder: Path) -> None:
-    """Write every part, and the moving pictures of the environments, into a folder."""
+    """Write every part into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     stage("reference pages from code")
     for name, part in PARTS.items():
         (folder / name).write_text(part(), encoding="utf-8")
-    stage("moving pictures of the environments")
-    pictures(folder)

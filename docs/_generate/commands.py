@@ -1,4 +1,4 @@
-"""Every command of ``birthsim`` with its options, from the settings that are read."""
+"""Every command of ``birthsim`` with its options, from the settings that are read; and the files of tables that they read."""
 
 from typing import Any
 
@@ -24,3 +24,9 @@ def _of(name: str, settings: type[Any], example: str) -> str:
     """A section, from the settings of a command."""
     _, _, text = program(f"birthsim {name}", settings).generate_docs(usage_name="birthsim").partition("\n")
     return f"## `birthsim {name}`\n{text.rstrip()}\n\nExample: `birthsim {example.rstrip()}`"
+
+
+def readers() -> str:
+    """A row for each kind of file that holds a table."""
+    rows = [f"| `{one.name}` | {one.about} | {', '.join(sorted(one.needs))} |" for one in entries("reader")]
+    return "\n".join(["| ending, in any case | what is read | needs |", "|---|---|---|", *rows])

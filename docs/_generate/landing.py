@@ -6,14 +6,17 @@ from docutils import nodes
 
 from _generate.notebooks import repository
 
+FILMS = {"controller=backstepping": "pull.webp"}
+"""What a page of the rig is asked for -> the film that shows the same, for pages that are opened from a disk (disk.js)."""
+
 
 def rig_role(name, rawtext, text, lineno, inliner, options=None, content=()):
     """The page of the rig, embedded; ``text`` is what its address asks for."""
     up = "../" * inliner.document.settings.env.docname.count("/")
     source = f"{up}rig/index.html?embed=1&{text}"
-    frame = (
-        f'<iframe class="rig" src="{escape(source)}" title="The rig in the browser: {escape(text)}" loading="lazy"></iframe>'
-    )
+    film = f' data-film="{up}_static/{FILMS[text]}"' if text in FILMS else ""
+    title = f"The rig in the browser: {escape(text)}"
+    frame = f'<iframe class="rig" src="{escape(source)}" title="{title}" loading="lazy"{film}></iframe>'
     return [nodes.raw("", frame, format="html")], []
 
 

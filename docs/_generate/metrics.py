@@ -38,7 +38,7 @@ def metrics() -> str:
             f"- `stiffness_error`, `cross_motion` and `unrest` exist where the target stands still and the episode ends in "
             f"a push held for {HELD:g} s. Positions are means over {WINDOW:g} s, so hunting does not enter.",
             f"- Stuck: slower than {1e3 * STUCK:g} mm/s. Restarted: faster than {1e3 * RUNNING:g} mm/s after that.",
-            "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what "
+            "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../laboratory/haptics.md) defines what "
             "`birthsim study haptics` measures.",
         ]
     )

@@ -71,4 +71,6 @@ def links(name: str) -> str:
         found["Open in Binder"] = (
             f"https://mybinder.org/v2/gh/{where}/{BRANCH}?labpath={quote(f'notebooks/{name}.ipynb', safe='')}"
         )
-    return f'<p class="notebook">{" · ".join(f"""<a href="{address}">{words}</a>""" for words, address in found.items())}</p>\n'
+    saved = {address: " download" for address in found.values() if "://" not in address}
+    links = (f'<a href="{address}"{saved.get(address, "")}>{words}</a>' for words, address in found.items())
+    return f'<p class="notebook">{" · ".join(links)}</p>\n'

@@ -30,7 +30,7 @@ class Listed(NamedTuple):
 
 OWN = {
     "status": "list which results/*.json are fresh, and what has changed",
-    "render": "write tables of docs, README, scores from results/",
+    "render": "write tables of docs, and scores, from results/",
     "draw": "draw the pictures of docs from results/*.json",
     "renew": "run every study whose result is stale",
 }

@@ -7,14 +7,15 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
 from birthsim.command_line.command import perform_with
-from birthsim.command_line.settings import Configured
-from birthsim_env.files import write_text
+from birthsim.command_line.settings import Configured, Style
+from birthsim_env.files import make_folder, write_text
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.values import shown
 from birthsim_env.registry import entry
@@ -22,14 +23,14 @@ from lab.engine.door import OWN, studies
 from lab.engine.results import changed, read_result
 from lab.engine.study import Study
 
-DATA, PAGES = ROOT / "docs" / "data", (ROOT / "README.md", ROOT / "lab" / "paper" / "paper.md")
-ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
+DATA = ROOT / "docs" / "data"
+ELSEWHERE = {
+    "reference_scores.json": ROOT / "birthsim_env" / "scores.json",
+    "scale.json": ROOT / "birthsim" / "benchmark" / "scale.json",
+}
 """Texts that do not stand in ``DATA``."""
 
 _PICTURE = re.compile(r"\]\((?:\.\./)*(\w+\.svg)\)")
-_MARKED = re.compile(r"^<!-- results of (\w+) -->$.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)
-"""A table of a page: comments on lines of their own. A line that begins with a comment and goes on with text would be HTML to
-CommonMark, and its Markdown would stay raw, so there are no comments within lines."""
 
 
 def main() -> None:
@@ -37,12 +38,22 @@ def main() -> None:
     command = sys.argv[0]
     name = command.rpartition(" ")[2]
     if name in OWN:
-        action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
         does = f"{OWN[name][0].upper()}{OWN[name][1:]}."
+        if name == "draw":
+            perform_with(command, Drawing, lambda settings: draw(settings.style), "")
+            return
+        action = {"status": status, "render": render, "renew": renew}[name]
         perform_with(command, type("Settings", (Configured,), {"__doc__": does}), lambda _: action(), "")
     else:
         study = declared(name)
         perform_with(command, study.settings(studies()[name].about), partial(study.measure, name), "")
+
+
+@dataclass(kw_only=True)
+class Drawing(Configured):
+    """Draw the pictures of docs from results/*.json; for a paper all figures, into out/paper."""
+
+    style: Style = "screen"
 
 
 def declared(name: str) -> Study:
@@ -94,13 +105,7 @@ def texts(name: str) -> Iterator[tuple[Path, str]]:
 
 def rendered() -> dict[Path, str]:
     """Every file that shows results, and what should stand in it."""
-    found = {path: text for name in names() for path, text in texts(name)}
-    tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
-    for page in PAGES:
-        found[page] = _MARKED.sub(
-            lambda mark: f"<!-- results of {mark[1]} -->\n\n{tables[mark[1]]}\n<!-- end -->", page.read_text(encoding="utf-8")
-        )
-    return found
+    return {path: text for name in names() for path, text in texts(name)}
 
 
 def render() -> None:
@@ -111,13 +116,24 @@ def render() -> None:
             print(path.relative_to(ROOT))
 
 
-def draw() -> None:
-    """Draw the pictures of every result that a page of docs shows."""
-    shown = {name for page in (ROOT / "docs").rglob("*.md") for name in _PICTURE.findall(page.read_text(encoding="utf-8"))}
+def draw(style: str = "screen") -> None:
+    """Draw the pictures of every result that a page of docs shows, or those of all for a paper, into out/paper."""
+    # pyplot takes half a second to load.
+    from baselines.figures.style import drawn_for
+
+    if style == "paper":
+        folder = make_folder(ROOT / "out" / "paper")
+        with drawn_for(style):
+            for name in names():
+                for drawn in declared(name).draw(content, folder) if (content := read_result(name)) else ():
+                    print(drawn.relative_to(ROOT))
+        return
+    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")]
+    shown = {picture for text in pages for picture in _PICTURE.findall(text)}
     for name in names():
         if (content := read_result(name)) is not None:
-            with tempfile.TemporaryDirectory() as folder:
-                for path in declared(name).draw(content, Path(folder)):
+            with tempfile.TemporaryDirectory() as place:
+                for path in declared(name).draw(content, Path(place)):
                     if path.name in shown:
                         shutil.copy(path, ROOT / "docs")
 

@@ -18,7 +18,7 @@ from lab.engine import information
 from lab.engine.information import Row
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.haptics.worlds import POSES, Condition, lost_lanes
 from lab.studies.held import CLAMP, DAMPING, hold
@@ -110,26 +110,30 @@ def _shown(content: Content) -> dict[str, str]:
         (Row(one["controller"], one["rig"], one["file"]), (one["stiffness"], one["damping"]), one["friction"]): one
         for one in content["figures"]
     }
-    heads = [f"{stiffness / 1e3:g} kN/m, {damping:g} N s/m" for stiffness, damping in HANDS]
+    heads = [Head(f"{stiffness / 1e3:g} kN/m, {damping:g} N s/m", SPREAD) for stiffness, damping in HANDS]
     clamp = f"{CLAMP / 1e3:g} kN/m, {DAMPING:g} N s/m"
-    whole = [["controller", *information.COLUMNS, *heads, "presses, N", "air, l/min", "lost"]]
+    others = (Head("presses, N", SPREAD), Head("air, l/min", SPREAD), "lost")
+    whole: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *heads, *others]]
     for row in ROWS:
         held = [by[row, hand, DRAWN] for hand in HANDS]
         middle = by[row, (CLAMP, DAMPING), DRAWN]
         lost = str(sum(one["lost"] for one in held))
         name = f"`{row.controller}`" + (" with an acceleration sensor" if row.file else "")
-        felt = [cells(one["force"][:2]) for one in held]
-        whole.append([name, *row.facts(SENSORS), *felt, cells(middle["press"][:2]), cells(middle["air"][:2]), lost])
-    frictions = [["controller", *information.COLUMNS, *(f"`{name}`" for name in settings["friction"])]]
+        felt = [one["force"][:2] for one in held]
+        whole.append([name, *row.facts(SENSORS), *felt, middle["press"][:2], middle["air"][:2], lost])
+    frictions: list[list[Cell | Head]] = [
+        ["controller", *information.COLUMNS, *(Head(f"`{name}`", SPREAD) for name in settings["friction"])]
+    ]
     for row in BEST:
-        felt = [cells(by[row, (CLAMP, DAMPING), name]["force"][:2]) for name in settings["friction"]]
+        felt = [by[row, (CLAMP, DAMPING), name]["force"][:2] for name in settings["friction"]]
         frictions.append([f"`{row.controller}`", *row.facts(SENSORS), *felt])
     said = (
         f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS} sensors, rigs drawn, spring of {STIFFNESS / 1e3:g} kN/m. "
-        "Cells: force that the hand feels, N peak to peak, in the last 2 s of 5, median and 95th percentile, by the hand's "
-        f"stiffness and damping; what it is pressed with on average, and air, in that of {clamp}. {information.LEGEND}"
+        "Columns of hands: the force that the hand feels, N peak to peak, in the last 2 s of 5, by the hand's stiffness and "
+        f"damping. What it is pressed with on average, and air, are those of the hand of {clamp}. 95 % is the 95th percentile. "
+        f"{information.LEGEND}"
     )
-    sweep = "[sweep](explanation/friction.md#is-it-the-friction-that-controllers-expect)"
+    sweep = "[sweep](../explanation/friction.md#is-it-the-friction-that-controllers-expect)"
     other = f"In the hand of {clamp}, frictions of the {sweep}:"
     return {"clamp.md": f"{said}\n\n{markdown(whole)}\n\n{other}\n\n{markdown(frictions)}\n"}
 

@@ -18,7 +18,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, markdown
 
 ENVIRONMENT, CONTROLLER, SENSORS = "BirthSIM/Probe-v3", "admittance-adaptive", "lab"
 
@@ -65,6 +65,7 @@ def measure(others: int, priority: int, seconds: float) -> Result:
 
 
 PARTS = ("periods", "jitter", "computing")
+STATISTICS = ("median", "99.9 %", "largest")
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -83,9 +84,9 @@ def _kept(options: Options, found: Found) -> Any:
 def _shown(content: Content) -> dict[str, str]:
     settings, figures = content["settings"], content["figures"]
     head = ["condition", "samples", "late", "missed by the rig", "stalls of the rig"]
-    lines = [[*head, *(f"{name}, us: median, 99.9 %, largest" for name in PARTS)]]
+    lines: list[list[Cell | Head]] = [[*head, *(Head(f"{name}, us", STATISTICS) for name in PARTS)]]
     for one in figures:
-        cells = [", ".join(f"{1e6 * one[name][part]:.0f}" for part in ("median", "99.9 %", "largest")) for name in PARTS]
+        cells = [[f"{1e6 * one[name][part]:,.0f}" for part in STATISTICS] for name in PARTS]
         share = 100.0 * one["late"] / one["samples"]
         lines.append(
             [

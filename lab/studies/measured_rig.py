@@ -22,7 +22,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import SEED, worlds
 
 LEVELS = {"cylinder1.coulomb_friction": 12.0, "cylinder2.coulomb_friction": 15.0}
@@ -98,20 +98,21 @@ def _kept(_: Options, found: Found) -> Any:
     ]
 
 
-def _figures(row: dict[str, Any]) -> list[str]:
-    return [cells(row[name], " / ") for name in COLUMNS]
+def _figures(row: dict[str, Any]) -> list[Cell]:
+    return [row[name] for name in COLUMNS]
 
 
 def _shown(content: Content) -> dict[str, str]:
-    said = f"{worlds(content['settings']['seed'], content['settings']['episodes'])}; median / 95th percentile."
+    said = f"{worlds(content['settings']['seed'], content['settings']['episodes'])}."
     heads = [head for _, _, head in COLUMNS.values()]
-    both = [["controller", *information.COLUMNS, "sensors", *(f"{head}: {rig}" for head in heads for rig in WHOLE)]]
+    on_both = [Head(f"{head}, {rig}", SPREAD) for head in heads for rig in WHOLE]
+    both: list[list[Cell | Head]] = [["controller", *information.COLUMNS, "sensors", *on_both]]
     found = {(row["controller"], row["sensors"], row["rig"]): row for row in content["figures"]}
     for controller, sensors in dict.fromkeys(key[:2] for key in found):
         before, after = (_figures(found[controller, sensors, rig]) for rig in WHOLE)
         facts = information.informed(controller, sensors)
         both.append([f"`{controller}`", *facts, sensors, *itertools.chain(*zip(before, after, strict=True))])
-    parts = [["sensors", "what was measured", *heads]]
+    parts: list[list[Cell | Head]] = [["sensors", "what was measured", *(Head(head, SPREAD) for head in heads)]]
     for (controller, sensors, rig), row in found.items():
         if controller == content["settings"]["controller"][-1]:
             parts.append([sensors, WORDS.get(rig, rig), *_figures(row)])

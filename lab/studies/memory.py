@@ -31,7 +31,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, SPREAD_AND_WORST, Cell, Head, markdown
 from lab.engine.worlds import worlds
 
 CONFIGURATION = "circle_recurrent_apg"
@@ -165,23 +165,21 @@ def _order(key: tuple[str, str, float, int]) -> tuple[int, ...]:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    head = [
+    head: list[Cell | Head] = [
         "rigs, sensors",
         "policy",
         "period, ms",
         "seed",
-        "settled error, mm",
+        Head("settled error, mm", SPREAD_AND_WORST),
         f"beyond {FAR:g} mm",
         f"lost or {LOST_ERROR:g} mm off",
     ]
-    head += ["along the push, %", "wiped, mm", "CPU s"]
+    head += [Head("along the push, %", SPREAD), Head("wiped, mm", SPREAD), "CPU s"]
     rows = [head]
     for one in content["figures"]:
         own, learned = one["own"], one["period"] > 0
-        error, push = (
-            cells([own[name] for name in names]) for names in (("median", "q95", "worst"), ("stiffness", "stiffness95"))
-        )
-        wiped = cells([one["wiped"][name] for name in ("median", "q95")]) if "wiped" in one else "-"
+        error, push = ([own[name] for name in names] for names in (("median", "q95", "worst"), ("stiffness", "stiffness95")))
+        wiped = [one["wiped"][name] for name in ("median", "q95")] if "wiped" in one else "-"
         period, trained, spent = (
             (f"{1e3 * one['period']:g}", str(one["trained"]), f"{one['seconds']:.0f}") if learned else ("1", "-", "-")
         )

@@ -19,7 +19,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import worlds
 
 SENSORS = "encoders"
@@ -78,16 +78,17 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     settings, units = content["settings"], content["units"]
-    heads = [f"{name} at {tilt:g} degrees, {units[name]}" for name in UNITS for tilt in TILTS]
-    table = [["controller", *information.COLUMNS, *heads, "lost"]]
+    heads = [Head(f"{name} at {tilt:g} degrees, {units[name]}", SPREAD) for name in UNITS for tilt in TILTS]
+    heads.append(Head("lost", tuple(f"at {tilt:g} degrees" for tilt in TILTS)))
+    table: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *heads]]
     found = {(one["controller"], one["tilt"]): one for one in content["figures"]}
     for controller in settings["controller"]:
         own = [found[controller, tilt] for tilt in TILTS]
-        told = [cells(one[name]) for name in UNITS for one in own]
+        told = [one[name] for name in UNITS for one in own]
         facts = information.informed(controller, SENSORS)
-        table.append([f"`{controller}`", *facts, *told, cells([one["lost"] for one in own])])
+        table.append([f"`{controller}`", *facts, *told, [str(one["lost"]) for one in own]])
     said = (
-        f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS}, benches drawn. Cells: median and 95th percentile. "
+        f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS}, benches drawn. 95 % is the 95th percentile. "
         "*Error*: settled. *Stiffness*: how far the rendered one is from the setpoint in a test of 7 s on the same benches, "
         "with 5 to 40 N after 3 s and setpoints of 1000 to 4000 N/m. *Hunting*: peak to peak in a second before that push or "
         "under it, along x or y. *Lost*: episodes in which the piston hit its end stop, at each inclination. "

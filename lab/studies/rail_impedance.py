@@ -20,7 +20,7 @@ from lab.engine import information
 from lab.engine.information import Row
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.haptics.worlds import Condition, lost_lanes, resting
 from lab.studies.sensorless.privileged import Privileged
@@ -152,15 +152,16 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     settings = content["settings"]
-    whole = [["controller", *information.COLUMNS, "stiffness off, %", "damping off, %", "lost"]]
+    off = Head("stiffness off, %", SPREAD), Head("damping off, %", SPREAD)
+    whole: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *off, "lost"]]
     for one in content["figures"]:
         row = Row(one["controller"], one["rig"], one["file"])
-        felt = ["-" if one[name] is None else cells(one[name]) for name in UNITS]
+        felt = ["-" if one[name] is None else one[name] for name in UNITS]
         whole.append([f"`{row.controller}`", *row.facts(SENSORS), *felt, str(one["lost"])])
     asked = ", ".join(f"{setpoint:g}" for setpoint in SETPOINTS)
     said = (
         f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS}, benches drawn, a rail at {TILT:g} degrees, setpoints of "
-        f"{asked} N/m in turn. Cells: median and 95th percentile. *Stiffness off*: {PUSH:g} N over the way that they make in "
+        f"{asked} N/m in turn. 95 % is the 95th percentile. *Stiffness off*: {PUSH:g} N over the way that they make in "
         f"{HELD:g} s, from the setpoint. *Damping off*: of {SWING:g} N to and fro at {FREQUENCY:g} Hz, from what the "
         f"controller declares; a law with integral action alone declares nothing. {information.LEGEND}"
     )

@@ -21,7 +21,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import SEED, worlds
 from lab.studies.comparison.grid import Conditions, cell_task, gather, settings_of
 from lab.studies.comparison.privileged import TOLD
@@ -116,17 +116,17 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     settings, named = content["settings"], {one.name: one for one in SETS}
-    rows = [["sensors", "euro", "controller", *information.COLUMNS, *(head for _, head in METRICS.values()), "lost"]]
+    heads = [Head(head, SPREAD) for _, head in METRICS.values()]
+    rows: list[list[Cell | Head]] = [["sensors", "euro", "controller", *information.COLUMNS, *heads, "lost"]]
     for row in content["figures"]:
         one = named[row["sensors"]]
         facts = information.informed(one.controller, one.sensors, rig=row["rig"], parameters=one.file)
         price = "{:,.0f} to {:,.0f}".format(*row["price"])
-        figures = [cells(row[metric]) for metric in METRICS]
-        rows.append([one.name, price, f"`{one.controller}`", *facts, *figures, str(row["lost"])])
+        rows.append([one.name, price, f"`{one.controller}`", *facts, *(row[metric] for metric in METRICS), str(row["lost"])])
     prices = [["sensor", "euro", "what it stands for"]]
     prices += [[part, f"{low:,.0f} to {high:,.0f}", said] for part, (low, high, said) in PRICES.items()]
-    said = f"{worlds(settings['seed'], settings['episodes'])}, rigs and sensors drawn. Cells: median, 95th percentile."
-    table = markdown(rows, rows[0][7:-1], alike=[row[3] for row in rows[1:]])
+    said = f"{worlds(settings['seed'], settings['episodes'])}, rigs and sensors drawn."
+    table = markdown(rows, heads, alike=[str(row[3]) for row in rows[1:]])
     return {"sensors-bought.md": f"{said} {information.LEGEND}\n\n{table}\n\nPrices are assumed:\n\n{markdown(prices)}\n"}
 
 

@@ -23,7 +23,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import SEED, worlds
 
 CHOSEN = 920_000
@@ -80,12 +80,14 @@ def _crossing(value: float | None) -> str:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", *information.COLUMNS, "sensors", "crossing", *(head for _, _, head in COLUMNS.values())]]
+    heads = [Head(head, SPREAD) for _, _, head in COLUMNS.values()]
+    rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, "sensors", "crossing", *heads]]
     for row in content["figures"]:
         if row["worlds"] == "judged":
-            figures = [cells(row[name], " / ") for name in COLUMNS]
             facts = information.informed(row["controller"], row["sensors"])
-            rows.append([f"`{row['controller']}`", *facts, row["sensors"], _crossing(row["crossing"]), *figures])
+            rows.append(
+                [f"`{row['controller']}`", *facts, row["sensors"], _crossing(row["crossing"]), *(row[name] for name in COLUMNS)]
+            )
     count = content["settings"]["episodes"]
     chosen = f"The crossing was chosen on {worlds(CHOSEN, count)}, which the picture has too."
     said = f"{worlds(content['settings']['seed'], count)}. {chosen}"
@@ -114,7 +116,8 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
                         mark = "x" if row["crossing"] is None else "o"
                         panel.plot(row["settled"][0], row["held_turns"][0], mark, color=colour, fillstyle="none")
             panel.set(title=f"{sensors} sensors", xlabel="settled error of circles (mm)")
-            panel.set_ylim(bottom=0.0)
+            low, high = panel.get_ylim()
+            panel.set_ylim(bottom=0.0 if low < high / 2.0 else low)
         axes[0, 0].set_ylabel("turns of a valve (1/s)")
         cost = 100 * _cost(rows, kinds[0], own)
         words = f"With {kinds[0]} sensors a crossing of {100 * own:g} % of full flow (o) errs by {cost:.2g} % more"

@@ -73,5 +73,5 @@ def test_tables_show_the_plants_row_and_what_is_unstable(found, tmp_path):
     assert rig in found["rigs"]
     assert rig != "slow corner"
     assert accuracy_tables.number(None) == "unstable" == accuracy_tables.number(math.inf)
-    assert [accuracy_tables.number(v) for v in (12.3, 0.0123, 1.2e5)] == ["12", "0.012", "1.2e+05"]
+    assert [accuracy_tables.number(v) for v in (12.3, 0.0123, 1.2e5)] == ["12.3", "0.0123", "120,000"]
     assert {path.name for path in accuracy_figure(found, tmp_path)} == {"accuracy.png", "accuracy.svg"}

@@ -5,6 +5,8 @@ import re
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from agents.reports.correction_figure import draw_corrections
@@ -135,3 +137,39 @@ def test_twenty_four_controllers_have_marks_of_their_own():
     marks = [style.look(k) for k in range(24)]
     assert len({(one["marker"], one.get("mfc")) for one in marks}) == 24
     assert style.look(23, markers=False).keys() == {"color", "linestyle"}
+
+
+def test_for_a_paper_figures_have_its_width_and_its_letters_no_title_and_carry_their_fonts(tmp_path, monkeypatch):
+    drawn, save_figure = [], Figure.savefig
+
+    def kept(self, file, **options):
+        self.canvas.draw()
+        drawn.append(self)
+        save_figure(self, file, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    before = dict(style.STYLE)
+    with style.drawn_for("paper"):
+        for draw in DRAWINGS.values():
+            draw(tmp_path)
+    paths = sorted(tmp_path.iterdir())
+    assert before == style.STYLE
+    assert len(drawn) == len(paths) >= len(DRAWINGS)
+    assert {path.suffix for path in paths} == {".pdf"}
+    assert all(b"FontFile2" in path.read_bytes() for path in paths)
+    for figure in drawn:
+        assert figure.get_suptitle() == ""
+        assert any(np.isclose(figure.get_figwidth(), width) for width in (3.5, 7.16))
+        letters = {text.get_fontsize() for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()}
+        assert letters == {8.0}
+
+
+def test_a_short_logarithmic_axis_has_several_labels():
+    figure, axes = plt.subplots(2)
+    for panel, high in zip(axes, (5.0, 500.0), strict=True):
+        panel.set(xscale="log", xlim=(0.5, high))
+        style.log_ticks(panel.xaxis, 1.0)
+    figure.canvas.draw()
+    said = [[tick for tick in panel.get_xticks() if panel.get_xlim()[0] <= tick <= panel.get_xlim()[1]] for panel in axes]
+    assert said == [[1.0, 3.0], [1.0, 10.0, 100.0]]
+    plt.close(figure)

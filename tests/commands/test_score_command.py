@@ -5,15 +5,18 @@ import json
 import gymnasium
 import numpy as np
 import pytest
-from scipy.stats import trim_mean
+from scipy.stats import gmean, trim_mean
 
 import birthsim
-from baselines.bench.statistics import interquartile_mean, stratified_interval
-from birthsim.benchmark.suites import SUITES, task_of
+from agents.policy.seeds import policy_folders
+from baselines.bench.statistics import interquartile_mean, penalize_lost, stratified_interval
+from birthsim.benchmark.scale import BEST, SHUT, counted_error, ends, factor_per_point, score_of
+from birthsim.benchmark.scoring import plan
+from birthsim.benchmark.suites import SUITES, TASKS, find_task, task_of
 from birthsim_env.splits import TEST
 from tests.console import OWN, call, strict
 
-PROBE = "BirthSIM/Probe-v3"
+PROBE, RAIL = "BirthSIM/Probe-v3", "BirthSIM/Rail-v0"
 STILL = """
 import numpy as np
 
@@ -38,13 +41,17 @@ def test_a_row_says_what_an_evaluation_reaches(tmp_path, monkeypatch, capsys):
     assert (row["entry"], row["kinds"], row["split"], row["seed"]) == ("backstepping", ["controller"], "test", TEST.first)
     found = birthsim.evaluate(PROBE, "backstepping", episodes=6, seed=80_000, sensors="lab", randomize=True, progress=False)
     (one,) = row["tasks"]
-    score = np.mean(birthsim.normalized_score(PROBE, found.returns[1.0], "lab"))
+    within = np.array(found.required_strength_ratio) <= 0.9
+    errors = np.array(found.metrics["settled_rms"])[within]
+    shut, best = (ends("probe-lab")[role]["error_mm"] for role in (SHUT, BEST))
+    score = 100 * np.log(shut / gmean(errors)) / np.log(shut / best)
     assert one["score"]["value"] == pytest.approx(score)
     assert one["scores"] == pytest.approx([score])
     assert one["score"]["low"] < score < one["score"]["high"]
-    assert one["error_mm"]["value"] == pytest.approx(np.median(found.metrics["settled_rms"]))
-    within = np.array(found.required_strength_ratio) <= 0.9
-    assert one["feasible"] == within.sum()
+    assert one["error_mm"]["value"] == pytest.approx(np.median(errors))
+    assert one["errors"] == [found.metrics["settled_rms"]]
+    assert one["infeasible"] == np.flatnonzero(~within).tolist()
+    assert one["returns"] == pytest.approx([np.mean(found.returns[1.0])])
     assert one["success"]["value"] == pytest.approx(np.mean(np.array(found.success)[within]))
     assert one["lost"] == [0]
     assert row["seconds"] > 0
@@ -52,7 +59,7 @@ def test_a_row_says_what_an_evaluation_reaches(tmp_path, monkeypatch, capsys):
     assert "probe-lab" in printed
 
 
-def test_infeasible_worlds_do_not_count_for_success(monkeypatch):
+def test_infeasible_worlds_count_for_nothing(monkeypatch):
     """On a heavy rig, whose cylinders bear only some of the pushes."""
     heavy = birthsim.Parameters().replace({"mechanics.mass": 5.5})
     monkeypatch.setattr("birthsim.benchmark.suites.rig_for", lambda *_: heavy)
@@ -61,8 +68,63 @@ def test_infeasible_worlds_do_not_count_for_success(monkeypatch):
     found = birthsim.evaluate(PROBE, birthsim.make_controller("pid", heavy), **world)
     within = np.array(found.required_strength_ratio) <= 0.9
     assert 0 < within.sum() < 12
-    assert one["feasible"] == within.sum()
+    assert one["infeasible"] == np.flatnonzero(~within).tolist()
     assert one["success"]["value"] == pytest.approx(np.mean(np.array(found.success)[within]))
+    errors = np.array(penalize_lost(found.metrics["settled_rms"], found.lost))
+    assert one["error_mm"]["value"] == pytest.approx(np.median(errors[within]))
+    shut, best = (ends("probe-ideal")[role]["error_mm"] for role in (SHUT, BEST))
+    mean = gmean(counted_error(found.metrics["settled_rms"], found.lost)[within])
+    assert one["score"]["value"] == pytest.approx(100 * np.log(shut / mean) / np.log(shut / best))
+
+
+def test_a_lost_episode_is_as_bad_as_any_error_and_no_error_is_better_than_the_least():
+    assert counted_error([0.5, 0.5, 300.0, 0.0, np.nan], [False, True, False, False, True]).tolist() == [
+        0.5,
+        100,
+        100,
+        1e-3,
+        100,
+    ]
+    assert np.isnan(counted_error([np.nan], [False])).all()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_task_has_a_scale_of_which_a_point_resolves_a_tenth_of_an_error(task):
+    known = ends(task)
+    shut, best = (known[role]["error_mm"] for role in (SHUT, BEST))
+    assert score_of(task, [shut, best, np.sqrt(shut * best)]) == pytest.approx([0, 100, 50])
+    factor = factor_per_point(task)
+    assert score_of(task, best / factor) == pytest.approx(101)
+    assert 1.01 < factor < 1.1
+    for one in known.values():
+        assert one["low"] < one["error_mm"] < one["high"]
+        assert one["episodes"] > 100
+    assert find_task(task).is_scored
+
+
+def test_a_task_of_no_suite_has_success_and_errors_but_no_score(tmp_path, monkeypatch, capsys):
+    given = ("pid", "--env", RAIL, "--episodes", 2, "--jobs", 1, "--out", tmp_path / "out")
+    status, printed, complained = call("score", monkeypatch, capsys, *given)
+    assert status == 0, complained
+    assert "no score: only tasks of the suites have a scale" in printed
+    row = strict(tmp_path / "out" / "score.json")
+    (one,) = row["tasks"]
+    assert (one["score"], one["scores"], row["overall"]) == (None, None, None)
+    assert one["success"]["value"] is not None
+    assert one["error_mm"]["value"] > 0
+
+
+def test_tasks_are_chosen_by_name(tmp_path, monkeypatch, capsys):
+    given = ("shut-valves", "--tasks", "probe-lab", "probe-ideal", "--episodes", 2, "--jobs", 1, "--out", tmp_path / "out")
+    status, printed, complained = call("score", monkeypatch, capsys, *given)
+    assert status == 0, complained
+    row = strict(tmp_path / "out" / "score.json")
+    assert [one["task"] for one in row["tasks"]] == ["probe-lab", "probe-ideal"]
+    assert row["tasks"][0]["errors"] == row["tasks"][1]["errors"], "shut valves look at no sensor"
+    assert row["given"] == ["shut-valves"]
+    assert "interquartile mean of 2 tasks" in printed
+    every = plan("pid", None, "ideal", True, "all", None, 1, 0, 0.01, None, None)
+    assert every.tasks == tuple(TASKS.values())
 
 
 def test_several_policies_are_the_seeds_of_one_entry(tmp_path, monkeypatch, capsys):
@@ -88,6 +150,17 @@ def test_a_row_knows_the_seeds_of_a_trained_folder_and_what_a_task_is_called():
     assert len(set(row["sha256"][0])) == 5
     assert row["tasks"][0]["task"] == "circle-ideal"
     assert row["tasks"][0]["success"]["value"] == 1.0
+    said = [json.loads((one / "training.json").read_text()) for one in policy_folders("circle")]
+    assert [one["settings"]["seed"] for one in row["training"]] == list(range(5))
+    assert [one["steps"] for one in row["training"]] == [one["curve"][-1]["steps"] for one in said]
+
+
+def test_a_place_stands_for_the_name_of_a_scenario():
+    row = birthsim.score("{scenario}_apg", tasks=["probe-ideal", "circle-lab"], episodes=1, progress=False).row
+    for one, policy in zip(row["tasks"], ("probe_apg", "circle_apg"), strict=True):
+        alone = birthsim.score(policy, tasks=[one["task"]], episodes=1, progress=False).row
+        assert alone["tasks"][0]["errors"] == one["errors"]
+        assert alone["sha256"][0] in row["sha256"]
 
 
 def test_what_is_complete_is_kept(tmp_path, monkeypatch, capsys):
@@ -149,7 +222,6 @@ def test_every_task_of_a_suite_begins(task):
 def test_tasks_have_names_of_their_own_and_say_what_differs():
     tasks = [task for tasks in SUITES.values() for task in tasks]
     assert len({task.name for task in tasks}) == len(tasks)
-    assert [task.name for task in SUITES["classic"] if not task.is_scored] == []
     wide = next(task for task in tasks if task.name == "circle-honest-wide")
     assert wide.world["parameters"]["randomize"]["mechanics.mass"] == [1.0, 10.0]
     assert wide.rig == birthsim.Parameters(), "what controllers believe"
@@ -172,6 +244,11 @@ def test_the_interval_of_all_tasks_is_that_of_rliable():
     [
         ({"suite": "opne"}, r"suite = 'opne'.*; allowed: classic, open"),
         ({"suite": "open", "environment": PROBE}, r"environment = .* with suite = .*; allowed: one of them"),
+        ({"suite": "open", "tasks": ["probe-lab"]}, r"suite = .* with tasks = .*; allowed: one of them"),
+        ({"tasks": ["prob-lab"]}, r"task = 'prob-lab'.*probe-lab.*; allowed: circle-ideal, "),
+        ({"tasks": []}, r"tasks = \[\]; allowed: a list of names"),
+        ({"tasks": ["probe-lab"] * 2}, r"tasks = .*; allowed: .*each once"),
+        ({"tasks": ["probe-lab"], "sensors": "lab"}, r"sensors = 'lab'.* with tasks = .*; allowed: without"),
         ({"suite": "open", "sensors": "lab"}, r"sensors = 'lab'.* with suite = 'open'; allowed: without"),
         ({"suite": "open", "force_sensor": False}, r"force_sensor = False with suite = 'open'; allowed: without"),
         ({"environment": "BirthSIM/Square-v1"}, r"environment = 'BirthSIM/Square-v1'; allowed: "),

@@ -4,6 +4,8 @@ import json
 import math
 from functools import cache
 from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import given
@@ -16,8 +18,10 @@ from baselines.logs.writing import WRITERS
 from birthsim_env import Parameters
 from birthsim_live.logs.reading import read_log
 from lab.engine.results import changed, read_result
-from lab.studies import leaderboard
-from tests.console import ROOT
+from lab.studies.leaderboard import entries as leaderboard
+from lab.studies.leaderboard.cards import cards
+from lab.studies.leaderboard.records import standings
+from tests.evaluated import evaluation_in
 from tests.fuzz.strategies import json_texts
 from tests.fuzz.watched import cases, watched
 
@@ -39,9 +43,12 @@ def evaluation(path, case):
 def entry(path, case):
     said = leaderboard.entry(path)
     case.names = ()
-    if problem := leaderboard.against_rules(said, path.parent):
+    if problem := leaderboard.against_rules(said, path):
         raise ValueError(problem)
-    leaderboard.row(said, "entry")
+    known = {"entry": said}
+    cards(known)
+    for one in said["tasks"]:
+        assert len(standings(one["task"], known)) <= 1
 
 
 def result(path, case):
@@ -49,14 +56,14 @@ def result(path, case):
 
 
 def evaluated():
-    """An evaluation of a few episodes, which are faster to change."""
-    content = json.loads((ROOT / "lab" / "leaderboard" / "pid.json").read_text(encoding="utf-8"))
-    for one in content["results"]:
-        for name in ("seeds", "lost", "success", "required_strength_ratio"):
-            one[name] = one[name][:2]
-        for name in ("episodes", "returns"):
-            one[name] = {key: values[:2] for key, values in one[name].items()}
-    return content
+    with TemporaryDirectory() as folder:
+        return json.loads(evaluation_in(Path(folder)).read_text(encoding="utf-8"))
+
+
+def scored():
+    """An entry of one task, which is faster to change."""
+    content = json.loads((leaderboard.ENTRIES / "pid.json").read_text(encoding="utf-8"))
+    return {**content, "tasks": content["tasks"][:1]}
 
 
 RESULT = {
@@ -78,7 +85,7 @@ OLDER = {name: value for name, value in RESULT.items() if name != "used"}
 READERS = {
     "training.json": (training, lambda: json.loads((policy_folders("probe")[0] / "training.json").read_text(encoding="utf-8"))),
     "evaluation.json": (evaluation, evaluated),
-    "entry.json": (entry, evaluated),
+    "entry.json": (entry, scored),
     "result.json": (result, lambda: RESULT),
     "result_of_files.json": (result, lambda: {**OLDER, "sources": {"birthsim_env/state.py": "9eeb256a93e6"}}),
 }

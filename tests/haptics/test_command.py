@@ -72,12 +72,15 @@ def test_tables_say_lost_and_refused():
         {"stiffness": 0.0, "refused": "stiffness setpoint ..."},
     ]
     table = backdriving_table([{**run, "backdriving": pieces}])
-    assert "| controller | rig | mass learned | force sensed | sensors | at 500 N/m | at 0 N/m |" in table
-    assert "| pid | default | no | no | lab | 2; lost | refused |" in table
-    piece = {"lost": [False], "overshoot_mm": [5.0], "speed": [1.5], "kinetic": [3.0], "energy": [0.0], "stored": 4.5}
-    assert "| pid | default | no | no | lab | 5; 5 | - | 1.5; 1.5 | - | 3; 3 | 4.5 | 0; 0 | 0 |" in release_table(
-        [{**run, "release": [{**piece, "ideal": None}]}]
+    assert (
+        "| controller | rig | mass learned | force sensed | sensors "
+        "| at 500 N/m: median of the means | at 500 N/m: largest | at 0 N/m: median of the means |" in table
     )
+    assert "| `pid` | default | no | no | lab | 2.00 | lost | refused | refused |" in table
+    piece = {"lost": [False], "overshoot_mm": [5.0], "speed": [1.5], "kinetic": [3.0], "energy": [0.0], "stored": 4.5}
+    first, second = release_table([{**run, "release": [{**piece, "ideal": None}]}]).split("\n\n")[1:]
+    assert first.endswith("\n| `pid` | default | no | no | lab | 5.00 | 5.00 | - | - | 1.50 | 1.50 | - | - |")
+    assert second.endswith("\n| `pid` | default | no | no | lab | 3.00 | 3.00 | 4.50 | 0 | 0 | 0 |")
 
 
 def test_the_phase_is_shown_near_the_declared_one():

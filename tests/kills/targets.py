@@ -26,7 +26,6 @@ trials = 4
 batch = 2
 "gain.bandwidth" = { from = 20, to = 80, log = true }
 """
-LOG = "lab/leaderboard/pid.json"
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,8 @@ TARGETS = {
     "onnx": Target("export --to onnx circle", file="policy.onnx"),
     "fmu": Target("export --to fmu", file="rig.fmu"),
     "c": Target("export --to c", "--controller pid"),
-    "parquet": Target(f"export --to parquet {LOG}", file="log.parquet"),
-    "mcap": Target(f"export --to mcap {LOG}", file="log.mcap"),
+    "parquet": Target("export --to parquet {evaluation}", file="log.parquet"),
+    "mcap": Target("export --to mcap {evaluation}", file="log.mcap"),
     "minari": Target(
         "export --to minari --env BirthSIM/Probe-v3 --level random --episodes 12", once=True, needs=("minari", "h5py")
     ),

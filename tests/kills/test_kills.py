@@ -16,6 +16,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from tests.evaluated import evaluation_in
 from tests.kills.left import assert_whole, leftovers, pieces, results, wholes
 from tests.kills.running import LOOK, Looks, Running
 from tests.kills.targets import SEARCH, SWEEP, TARGETS
@@ -228,6 +229,8 @@ def test_a_command_that_is_disturbed_ends_as_one_that_was_not(name, small, tmp_p
     for file, text in texts.items():
         (tmp_path / f"{file}.toml").write_text(text)
     files = {"small": small, **{file: tmp_path / f"{file}.toml" for file in texts}}
+    if "{evaluation}" in TARGETS[name].line:
+        files["evaluation"] = evaluation_in(tmp_path / "evaluated")
     course, rng = Course(TARGETS[name], tmp_path, files), np.random.default_rng([KILLS, list(TARGETS).index(name)])
     scenarios = [one for one in SCENARIOS if one != "disk full" or os.geteuid() == 0]
     first, met = list(TARGETS).index(name) % len(scenarios), 0

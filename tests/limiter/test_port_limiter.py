@@ -139,7 +139,7 @@ def test_a_name_puts_any_law_behind_the_limits():
 
 @pytest.mark.slow
 def test_a_clamp_that_swings_with_the_papers_law_gets_no_energy_behind_the_limits():
-    """20 kN/m, lab sensors: joules without the limits, see docs/haptics.md; with them what docs/limits.md allows."""
+    """20 kN/m, lab sensors: joules without the limits, see docs/laboratory/haptics.md; with them what docs/limits.md allows."""
     case = Cases([RIG], np.array([20000.0]), np.array([KX]), np.zeros(1), np.zeros(1))
     bare = judge(case, make_controller("backstepping", RIG), "lab", 0, None)
     limited = judge(case, make_controller("limited:backstepping", RIG), "lab", 0, None)

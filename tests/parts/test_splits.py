@@ -10,7 +10,8 @@ from baselines.work.tasks import run_tasks
 from birthsim.commands import tune
 from birthsim_env.splits import GUIDING, SPLITS, TEST, TRAIN, VALIDATION, caution, find_split, first_seed, split_of
 from lab.engine import worlds
-from lab.studies.leaderboard import RULES
+from lab.studies.leaderboard.entries import RULES
+from lab.studies.scores import scale
 from lab.studies.scores.study import STUDY
 from tests.console import OWN, call
 
@@ -32,6 +33,9 @@ def test_no_two_splits_share_a_seed():
         range(tune.WORLDS, tune.WORLDS + tune.LANES): "train",
         range(VALIDATION_SEED, VALIDATION_SEED + 512): "validation",
         range(STUDY.options["seed"], STUDY.options["seed"] + STUDY.options["episodes"]): "scale",
+        range(
+            scale.STUDY.options["seed"], scale.STUDY.options["seed"] + scale.APART + scale.STUDY.options["episodes"]
+        ): "scale",
         range(RULES["seed"], RULES["seed"] + RULES["episodes"]): "test",
         range(worlds.SEED, worlds.SEED + worlds.COUNT): "test",
         range(20_000, 20_064): "",

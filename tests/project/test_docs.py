@@ -10,13 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from agents.training.configuration import configuration_names
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
+from baselines.named import GUARDING, known_options, resolved, uncontrolled_names
 from birthsim.main import COMMANDS
 from birthsim_env import Parameters
 from birthsim_env.ids import environment_ids
 from birthsim_env.registry import names
 from lab.studies.comparison import tables as comparison_tables
+from lab.studies.leaderboard import tables as leaderboard_tables
 from lab.studies.scores import tables as score_tables
 from tests.console import ROOT
 from tests.live import axe, browser
@@ -82,12 +85,29 @@ def test_generated_parts_know_everything(parts):
     commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
     ids = [name for name in environment_ids() if "Residual" not in name]
     fields = [name for section in Parameters().to_dict().values() for name in section]
-    named = [*ids, *names("sensors"), *names("hand")]
     for part, known in (
-        *(("commands.md", commands), ("environments.md", named), ("metrics.md", UNITS), ("rig.md", fields)),
-        ("readers.md", names("reader")),
+        *(("commands.md", commands), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)),
+        *(("sensors.md", names("sensors")), ("hands.md", names("hand")), ("frictions.md", names("friction"))),
+        *(("readers.md", names("reader")), ("configurations.md", [*configuration_names(), "rig_reader", "vacuum_apg"])),
     ):
         assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
+
+
+@pytest.mark.parametrize("name", sorted({resolved(name)[0] for name in names("controller")}))
+def test_each_option_and_gain_of_a_controller_has_its_meaning_and_what_is_allowed(generated, name):
+    of = generated(".controllers")
+    page = "".join(of.options(family) for family in of.FAMILIES)
+    section = page.partition(f"### `{name}`\n")[2].partition("###")[0] if f"### `{name}`" in page else ""
+    on_pages = [option for option in known_options(name) or () if option not in GUARDING]
+    if name in ("residual", *uncontrolled_names()):
+        assert not section
+        return
+    rows = {row.split(" | ")[0].strip("| `"): row.strip("| ").split(" | ") for row in section.splitlines() if row[:3] == "| `"}
+    assert list(rows) == on_pages
+    for option, (_, unit, meaning, *others) in rows.items():
+        assert meaning.strip(), f"{option} has no meaning: docs/_generate/controllers.py"
+        assert all(cell.strip() for cell in others), option
+        assert unit.strip() or not re.search(r"\d", others[-1]) or "`" in others[-1], option
 
 
 def test_pages_of_the_code_spell_out_arguments_and_defaults(parts):
@@ -176,9 +196,13 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.csv")}
     columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
     text = "".join([*PAGES.values(), *TABLES.values()])
-    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((data/[^)]+)\)", text)}
+    assert set(columns) <= {Path(link).name for link in re.findall(r"\]\((?:\.\./)?(data/[^)]+)\)", text)}
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
-    others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
+    others = {
+        "scores.csv": score_tables.DATA,
+        "learned.csv": ("policy", *evaluation.DATA),
+        "leaderboard.csv": leaderboard_tables.DATA,
+    }
     assert columns == compared | others
 
 
@@ -186,7 +210,7 @@ NOTEBOOKS = [page for page, text in PAGES.items() if "{code-cell}" in text]
 BRIEF = ("tutorials/first_episode",)
 """Notebooks that a commit runs; the others weekly."""
 
-LARGE = ("comparison", "reference/environments", "reference/commands")
+LARGE = ("laboratory/comparison", "environments/index", "environments/circle", "reference/commands")
 """Pages of which each takes axe half a minute."""
 
 

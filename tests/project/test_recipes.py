@@ -45,7 +45,7 @@ ADDED = {
     "parameter": Recipe("quadratic_friction", ("tests/oracles/test_completeness.py",), 1),
     "study": Recipe("lab-sensors", said=(("-m", "birthsim", "study", "--help"),)),
 }
-PAGES = {"controller": "controllers.md", "sensor": "environments.md", "scenario": "environments.md", "parameter": "rig.md"}
+PAGES = {"controller": "controllers.md", "sensor": "sensors.md", "scenario": "environments.md", "parameter": "rig.md"}
 """Recipe -> the generated part of the documentation that has a row of it."""
 
 

@@ -1,4 +1,4 @@
-"""docs/verification.md: whatever it names exists, its bounds are those of its tests, and it has the paper's equations."""
+"""docs/laboratory/verification.md and promises.md: what they name exists, with its bounds, and no equation is missing."""
 
 import ast
 import re
@@ -8,7 +8,8 @@ import pytest
 
 from tests.console import ROOT
 
-PAGE = (ROOT / "docs" / "verification.md").read_text(encoding="utf-8")
+LABORATORY = ROOT / "docs" / "laboratory"
+PAGE = "".join((LABORATORY / f"{name}.md").read_text(encoding="utf-8") for name in ("verification", "promises"))
 TESTS = sorted(set(re.findall(r"`([\w/]+\.py)::(\w+)`", PAGE)))
 CODE = [(path, re.findall(r"\w+", names)) for path, names in re.findall(r"`(\w+/[\w/]+\.py)`: (`\w+`(?:, `\w+`)*)", PAGE)]
 BOUNDS = [(bounds, tests) for bounds, tests in re.findall(r"\| ([^|]*: [\d.]+(?:e-?\d+)?) \| (`[^|]+`) \|", PAGE)]

@@ -39,9 +39,9 @@ def test_a_lost_rig_counts_as_the_worst_and_each_hand_has_its_column():
     figures = STUDY.keep(OPTIONS, {key: result(*key[:3]) for key in tasks})
     (held, frictions) = STUDY.show({"figures": figures, "settings": vars(OPTIONS)})["clamp.md"].split("In the hand of")
     first = next(line for line in held.splitlines() if line.startswith("| `admittance-adaptive` | default"))
-    assert first.startswith("| `admittance-adaptive` | default | yes | yes | 5, 5 | 10, 10 | 20, 20 |")
+    assert first.startswith("| `admittance-adaptive` | default | yes | yes | 5.00 | 5.00 | 10.0 | 10.0 | 20.0 | 20.0 |")
     assert "lost" in next(line for line in held.splitlines() if line.startswith("| `pid`"))
-    assert frictions.count("77, 77") == 2 * len(BEST)
+    assert frictions.count("77.0 | 77.0") == 2 * len(BEST)
 
 
 def test_a_hand_feels_its_own_stiffness_of_a_port_that_moves_as_told():

@@ -48,8 +48,8 @@ def test_tables_name_the_worst_friction_and_have_all():
     figures = STUDY.keep(OPTIONS, {key: result(key[0]) for key in tasks})
     texts = STUDY.show({"figures": figures, "settings": vars(OPTIONS)})
     head, _, first, *_ = texts["friction-laws.md"].split("\n\n")[1].splitlines()
-    assert head.startswith("| controller | rig | mass learned | force sensed | hunting, mm: as expected | hunting, mm: worst |")
-    assert first.startswith("| `admittance-adaptive` | default | yes | yes | 1, 1 | lost, lost `gms` |")
+    assert head.startswith("| controller | rig | mass learned | force sensed | hunting as expected, mm: median |")
+    assert first.startswith("| `admittance-adaptive` | default | yes | yes | 1.00 | 1.00 | lost | lost | `gms` |")
     each = texts["friction-laws-each.md"]
-    assert each.count("| `coulomb` | 3, 3 |") == len(METRICS)
+    assert each.count("| `coulomb` | 3.00 | 3.00 |") == len(METRICS)
     assert ASSUMED in OPTIONS.friction

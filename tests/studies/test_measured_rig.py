@@ -39,7 +39,7 @@ def test_the_tables_have_both_rigs_and_every_part():
     figures = measured_rig.STUDY.keep(OPTIONS, {key: {name: [1.5, 2.5] for name in measured_rig.COLUMNS} for key in tasks})
     text = measured_rig.STUDY.show({"figures": figures, "settings": vars(OPTIONS)})["measured-rig.md"]
     row = "| `admittance-adaptive` | default | no | yes | ideal |"
-    assert f"{row}{6 * ' 1.5 / 2.5 |'}\n" in text, "assumed and measured, of three metrics"
+    assert f"{row}{4 * ' 1.50 | 2.50 |'}\n" in text, "assumed and measured, of two metrics"
     assert [line.split(" | ")[1] for line in text.splitlines() if line.startswith("| ideal")] == ["nothing", *ASSUMED, "all"]
 
 

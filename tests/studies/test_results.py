@@ -80,11 +80,9 @@ def test_a_table_that_is_typed_is_written_anew(tmp_path, monkeypatch):
     expected = {path.name: text for path, text in shelf.texts(name)}
     (tmp_path / next(iter(expected))).write_text("| typed |")
     monkeypatch.setattr(shelf, "names", lambda: [name])
-    monkeypatch.setattr(shelf, "PAGES", (tmp_path / "README.md",))
-    (tmp_path / "README.md").write_text("no table")
     monkeypatch.setattr(shelf, "ROOT", tmp_path)
     shelf.render()
-    assert {path.name: path.read_text() for path in tmp_path.iterdir() if path.name != "README.md"} == expected
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == expected
 
 
 def test_status_lists_every_study(monkeypatch, capsys):

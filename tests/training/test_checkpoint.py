@@ -12,9 +12,10 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from agents.policy.files import WEIGHTS
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from agents.training.checkpoint import FORMAT, NAME
+from agents.training.checkpoint import FORMAT, NAME, _nested, write_checkpoint
 from agents.training.configuration import algorithm_of, override
 from agents.training.reached import described
 from agents.training.sb3.adapter import SB3VecEnv
@@ -103,6 +104,83 @@ def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, 
     with pytest.raises(ValueError, match=rf"is of a training with other {named}; allowed: the same settings"):
         train(settings, residual, tmp_path, rig)
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def _without(name):
+    """Leaves out what stands at a place such as ``reached/law``."""
+
+    def change(past):
+        *places, last = name.split("/")
+        for place in places:
+            past = past[int(place) if place.isdigit() else place]
+        del past[last]
+
+    return change
+
+
+def _set(name, value):
+    def change(past):
+        *places, last = name.split("/")
+        for place in places:
+            past = past[int(place) if place.isdigit() else place]
+        past[last] = value
+
+    return change
+
+
+BROKEN_PASTS = {
+    **{name: (_without(name), name.split("/")[-1]) for name in ("reached", "due", "best", "seconds", "events")},
+    **{name: (_without(name), name.split("/")[-1]) for name in ("reached/law", "reached/policy", "reached/curve")},
+    "a metric": (_without("reached/law/pooled_mm"), r"past\.reached\.law lacks 'pooled_mm'"),
+    "a metric of the best": (_without("reached/policy/lost"), r"past\.reached\.policy lacks 'lost'"),
+    "a point": (_without("reached/curve/0/steps"), r"past\.reached\.curve\[0\] lacks 'steps'"),
+    "a text": (_set("seconds", "long"), r"past\.seconds = 'long'; allowed: a number"),
+    "infinite": (_set("seconds", float("inf")), r"past\.seconds = inf; allowed: a number from 0"),
+    "not a number": (_set("due", float("nan")), r"past\.due = nan; allowed: a number from 0 to 256"),
+    "beyond the end": (_set("due", 1e9), r"past\.due = 1000000000\.0; allowed: a number from 0 to 256"),
+    "a size": (_set("events", {"events.out.tfevents.1": -1}), r"past\.events.*= -1; allowed: 0 to"),
+    "a law of words": (_set("reached/law", "good"), r"past\.reached\.law = 'good'; allowed: an object with pooled_mm"),
+    "no policy": (_set("reached/policy", None), r"past\.reached\.policy is empty.*; allowed: all or none"),
+    "another paper": (_set("reached/paper", {}), r"past\.reached\.paper"),
+    "no bytes": (_set("best", [1, 2]), r"past\.best = \[1, 2\]; allowed: bytes"),
+    "other bytes": (
+        _set("best", np.arange(200, dtype=np.uint8)),
+        r"past\.best is .*damaged.*; allowed: the content of",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """The checkpoint of a training that has ended, with its settings."""
+    folder, settings = tmp_path_factory.mktemp("past"), override(TINY, steps=256, validations=1)
+    train(settings, ResidualSettings(policy_period=0.1), folder)
+    return settings, folder
+
+
+@pytest.mark.parametrize("case", BROKEN_PASTS)
+def test_a_past_that_cannot_be_is_refused_by_name_before_anything_is_made_of_it(tmp_path, interrupted, case):
+    settings, folder = interrupted
+    change, named = BROKEN_PASTS[case]
+    arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
+    content = _nested(about["content"], arrays)
+    change(content["past"])
+    write_checkpoint(tmp_path, about["settings"], content)
+    before = (tmp_path / NAME).read_bytes()
+    with pytest.raises(ValueError, match=rf"(?s)does not fit this version .*{named}.*; allowed: a checkpoint that") as caught:
+        train(settings, ResidualSettings(policy_period=0.1), tmp_path)
+    assert repr(str(tmp_path / NAME)) in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == [NAME]
+    assert (tmp_path / NAME).read_bytes() == before
+
+
+def test_the_past_of_a_whole_training_is_one(tmp_path, interrupted):
+    settings, folder = interrupted
+    arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
+    write_checkpoint(tmp_path, about["settings"], _nested(about["content"], arrays))
+    found = train(settings, ResidualSettings(policy_period=0.1), tmp_path)
+    assert [point["steps"] for point in found["curve"]] == [0, 256]
+    assert (tmp_path / WEIGHTS).read_bytes() == (folder / WEIGHTS).read_bytes()
 
 
 def _told(model, env):

@@ -15,7 +15,8 @@ from torch.optim.optimizer import register_optimizer_step_post_hook
 
 from agents.policy.files import WEIGHTS, read_policy
 from agents.residual.settings import ResidualSettings
-from agents.training import policy_gradient, reached, watch
+from agents.training import reached, watch
+from agents.training.by_gradients import policy_gradient
 from agents.training.checkpoint import NAME
 from agents.training.configuration import override
 from agents.training.interruption import Interrupted

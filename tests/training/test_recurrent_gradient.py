@@ -13,10 +13,10 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import read_policy
 from agents.policy.onnx_export import export_onnx
 from agents.residual.privileged import TRUE_PARAMETERS, with_true_parameters
-from agents.training import lanes as module
+from agents.training.by_gradients import lanes as module
+from agents.training.by_gradients.lanes import Lanes
+from agents.training.by_gradients.policy_gradient import PolicyGradient
 from agents.training.differentiated import Differentiated
-from agents.training.lanes import Lanes
-from agents.training.policy_gradient import PolicyGradient
 from agents.training.trainer import train
 from baselines.bench.evaluation import evaluate
 from birthsim_env.observation import SIZE

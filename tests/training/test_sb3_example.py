@@ -1,4 +1,4 @@
-"""examples/sb3_ppo.py: it learns in lanes, saves its model, and ends with the score that ``birthsim.score`` gives."""
+"""examples/sb3_ppo.py and sb3_others.py: they learn in lanes, save a model, and end with the score of ``birthsim.score``."""
 
 import os
 import re
@@ -30,3 +30,24 @@ def test_the_example_saves_a_model_and_prints_its_score(tmp_path):
     assert said is not None, done.stdout
     assert said[1] == f"{row['tasks'][0]['score']['value']:.1f}"
     assert "paper's law" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "algorithm", "steps"),
+    [
+        ("recurrent-ppo", "RecurrentPPO", 4096),
+        ("sac", "SAC", 1600),
+        pytest.param("tqc", "TQC", 1600, marks=pytest.mark.weekly),
+    ],
+)
+def test_the_other_algorithms_save_a_model_that_is_scored(tmp_path, name, algorithm, steps):
+    file = tmp_path / "model.zip"
+    command = [sys.executable, str(ROOT / "examples" / "sb3_others.py"), name, PROBE, str(steps), "3", str(file)]
+    done = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert algorithm_in(file) == algorithm
+    assert re.search(rf"^{steps:,} steps in \d+ CPU s", done.stdout, re.MULTILINE), done.stdout
+    assert re.search(r"^probe-ideal +-?[\d.]+ \[", done.stdout, re.MULTILINE), done.stdout

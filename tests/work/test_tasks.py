@@ -2,7 +2,10 @@
 
 import json
 import math
+import os
 import signal
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,7 @@ from baselines.work import asked, tasks
 from baselines.work.calls import called_by
 from baselines.work.tasks import Task, code_stamp, run_tasks
 from birthsim_env.registry import entry, register
+from tests.console import PATIENCE
 
 
 def square(log, number):
@@ -148,3 +152,46 @@ def test_a_piece_keeps_which_entries_it_asked_for_and_is_computed_anew_where_one
     assert tasks.is_kept(one, tmp_path)
     monkeypatch.setattr(tasks, "called_by", lambda work, used: {"hand": "changed"} if "hand=hand one" in used else {})
     assert not tasks.is_kept(one, tmp_path)
+
+
+def keep(log, number, place, ending):
+    """Works until it is asked to end, and keeps how far it has come."""
+    Path(f"{log}-{number}").touch()
+    until = time.monotonic() + PATIENCE
+    while not ending.exists():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    Path(place).mkdir(parents=True)
+    (Path(place) / "kept").write_text(str(number))
+    raise RuntimeError(f"piece {number} keeps what it has")
+
+
+def signal_once(there):
+    """Ctrl-C for this process as soon as what is looked for is there."""
+
+    def look():
+        until = time.monotonic() + PATIENCE
+        while not there() and time.monotonic() < until:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=look, daemon=True).start()
+
+
+def test_pieces_that_keep_more_end_by_themselves_after_ctrl_c_and_no_other_begins(log, tmp_path, capfd):
+    pieces = [Task(f"deep/{k}", keep, {"log": str(log), "number": k}, keeps=True) for k in range(4)]
+
+    def begun():
+        return [k for k in range(4) if Path(f"{log}-{k}").exists()]
+
+    signal_once(lambda: len(begun()) == 2)
+    with pytest.raises(KeyboardInterrupt):
+        run_tasks(pieces, tmp_path / "out", 2, "work")
+    assert len(begun()) == 2
+    assert sorted(int(path.read_text()) for path in (tmp_path / "out").rglob("kept")) == begun()
+    assert list((tmp_path / "out").rglob("*.json")) == []
+    said = capfd.readouterr().out
+    assert tasks.WORDS in said
+    assert all(f"piece {k} keeps what it has" in said for k in begun())
+    assert "work: 0 of 4 are complete and kept; the same command goes on" in said
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

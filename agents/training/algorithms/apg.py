@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @register(algorithm="apg", about="Gradients of the reward through the closed loop.", needs={"extra agents"}, order=50)
 class AnalyticPolicyGradient(Algorithm):
-    """``agents.training.policy_gradient``."""
+    """``agents.training.by_gradients.policy_gradient``."""
 
     takes = frozenset({"target", "beside", "noise", "memory", "privileged", "horizon", "most_cost"})
     collects = True
@@ -31,6 +31,6 @@ class AnalyticPolicyGradient(Algorithm):
         return f"friction = {settings.friction!r} with algorithm = 'apg', though {OPTIONAL} has no gradients; allowed: {others}"
 
     def learner(self, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> Learner:
-        from agents.training.policy_gradient import PolicyGradient
+        from agents.training.by_gradients.policy_gradient import PolicyGradient
 
         return PolicyGradient(settings, envs, folder)

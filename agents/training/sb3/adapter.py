@@ -22,11 +22,14 @@ KEPT = {"returns": FLOATS, "lengths": Kept(0, whole=True)}
 """What a state has of the episodes so far."""
 
 
+SET_RANGES = "set_ranges"
+"""What Stable-Baselines3 may call, of all lanes together."""
+
 LANE_ATTRIBUTES: dict[str, Callable[[Any, int], Any]] = {
     "action_space": lambda env, _: env.single_action_space,
     "observation_space": lambda env, _: env.single_observation_space,
-    "measurement": lambda env, lane: measurement_of(env.measurement, lane),
-    "reference": lambda env, lane: Reference(env.reference.rows[:, lane]),
+    "measurement": lambda env, lane: measurement_of(env.unwrapped.measurement, lane),
+    "reference": lambda env, lane: Reference(env.unwrapped.reference.rows[:, lane]),
     "scene": lambda env, lane: env.unwrapped.scene_of(lane),
 }
 """What differs from lane to lane, or is another thing of one lane than of all."""
@@ -38,7 +41,8 @@ def _shared(info: dict[str, Any]) -> dict[str, Any]:
 
 
 class SB3VecEnv(VecEnv):
-    """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
+    """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3, also in wrappers
+    of Gymnasium that work with that mode (docs/how-to/wrappers.md).
 
     ``infos[i]`` has what a single environment tells, such as ``cost``. When the episode of lane i ends, ``infos[i]["episode"]``
     has its return and length besides, and ``infos[i]["terminal_observation"]`` its last observation, as with
@@ -96,8 +100,8 @@ class SB3VecEnv(VecEnv):
         return observation, rewards.astype(np.float32), ended, infos
 
     def get_state(self) -> State:
-        """``env.get_state()``, and with it the returns and lengths of the episodes so far."""
-        return {**self.env.get_state(), "returns": self._returns.copy(), "lengths": self._lengths.copy()}
+        """``get_state()`` of the environment, which knows of no wrapper, and the returns and lengths of the episodes so far."""
+        return {**self.env.unwrapped.get_state(), "returns": self._returns.copy(), "lengths": self._lengths.copy()}
 
     def set_state(self, state: State) -> None:
         """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
@@ -105,7 +109,7 @@ class SB3VecEnv(VecEnv):
         for name, array in own.items():
             if complaint := KEPT[name].complaint(array, state.get(name), np.inf):
                 raise ValueError(f"state: {name!r} {complaint}")
-        self.env.set_state({name: value for name, value in state.items() if name not in own})
+        self.env.unwrapped.set_state({name: value for name, value in state.items() if name not in own})
         for name, array in own.items():
             array[:] = state[name]
 
@@ -119,13 +123,27 @@ class SB3VecEnv(VecEnv):
         lanes = list(self._get_indices(indices))
         if attr_name in LANE_ATTRIBUTES:
             return [LANE_ATTRIBUTES[attr_name](self.env, lane) for lane in lanes]
-        return [getattr(self.env, attr_name)] * len(lanes)
+        return [getattr(self.env if hasattr(self.env, attr_name) else self.env.unwrapped, attr_name)] * len(lanes)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        raise NotImplementedError(f"set_attr({attr_name!r}): the lanes share one environment; make it with other arguments")
+        raise NotImplementedError(
+            f"set_attr({attr_name!r}): the lanes share one environment; make it with other arguments, or call "
+            f"env_method({SET_RANGES!r}, ...)"
+        )
 
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
-        raise NotImplementedError(f"env_method({method_name!r}): the lanes share one environment; call it on .env")
+        """``env_method("set_ranges", randomize)``: what all lanes draw from their next episodes on.
+
+        Raises ``NotImplementedError`` for other methods and for some of the lanes.
+        """
+        lanes = list(self._get_indices(indices))
+        if method_name != SET_RANGES or len({*lanes}) < self.num_envs:
+            raise NotImplementedError(
+                f"env_method({method_name!r}) of {len(lanes)} lanes: the lanes share one environment; allowed: "
+                f"{SET_RANGES!r} of all {self.num_envs}; call others on .env"
+            )
+        self.env.unwrapped.set_ranges(*method_args, **method_kwargs)
+        return [None] * len(lanes)
 
     def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
         return [False] * len(list(self._get_indices(indices)))

@@ -63,6 +63,7 @@ class Problem:
         """Begin at the start states that fit a rig and offsets of ``sizes`` best, also where the guess does not lead there."""
         self.offsets.sizes = sizes
         self._start = begun_anew(self.offsets.corrected(), self.noise, rig, self._start)
+        self._at, self._slopes = (None, *self._at[1:]), None
 
     def settled(self, theta: Array) -> tuple[Array, Array]:
         """Start states (W, F) and residuals (W, R + F) at coordinates (Q,); NaN where the rig predicts no numbers."""

@@ -6,7 +6,7 @@ of its own, do not; they are lanes of the plant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +115,12 @@ class Windows:
             self.free,
             self.stiffness,
         )
+
+    def beginning(self, rows: int) -> Windows:
+        """The same windows, of whose measurements the first ``rows`` count."""
+        pressure_weights, arrived = self.pressure_weights.copy(), self.arrived < rows
+        pressure_weights[:, rows:] = 0.0
+        return replace(self, pressure_weights=pressure_weights, position_weights=self.position_weights * arrived)
 
 
 def check_begins(rig: Parameters, purpose: str) -> None:

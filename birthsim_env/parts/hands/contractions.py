@@ -102,9 +102,9 @@ class Contractions(UserForce):
         self.amplitude, self.lasts, self.push, self.heading = amplitude, lasts, push, heading
 
     def prepare(self, num_envs: int) -> None:
-        time, (least, most) = np.arange(0.0, self.lasts, self.GRID), self.pushes
+        time, most = np.arange(0.0, self.lasts, self.GRID), self.pushes[1]
         middle = np.clip((time - 0.25 * self.lasts) / (0.5 * self.lasts), 0.0, 1.0)
-        turns = [math.pi * time / self.lasts, *(math.pi * bumps * middle for bumps in range(least, most + 1))]
+        turns = [math.pi * time / self.lasts, *(math.pi * bumps * middle for bumps in range(most + 1))]
         self._waves: Array = np.array([exact.direction(one)[1] for one in turns])
         begins = self.lasts * np.arange(self.count)
         self._times: Array = np.concatenate([*(one + time for one in begins), [self.count * self.lasts]])
@@ -116,7 +116,7 @@ class Contractions(UserForce):
         least, most = self.pushes
         for own in self._own:
             amplitude, push = draw(self.amplitude, rng), draw(self.push, rng)
-            put(own, lane, (amplitude, push, whole(1, most - least + 2, rng)))
+            put(own, lane, (amplitude, push, whole(1 + least, 2 + most, rng)))
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces, heading = np.empty((time.shape[0], 2, time.shape[1])), Heading(self._heading)

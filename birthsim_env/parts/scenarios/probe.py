@@ -7,7 +7,7 @@ from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.registry import register
 
 REST = 3.0
-"""s before the push: with honest sensors the best law takes that long to bring the head to rest (docs/honest.md)."""
+"""s before the push: with honest sensors the best law takes that long to bring the head to rest (docs/laboratory/worst.md)."""
 
 
 @register(scenario="probe", about="The head stands still and gives way to whoever pulls it.", order=2)

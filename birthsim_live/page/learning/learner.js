@@ -1,4 +1,4 @@
-// The policy gradient of agents/training/policy_gradient.py: a short horizon forward and back in many lanes, and a step of Adam.
+// The policy gradient of agents/training/by_gradients: a short horizon forward and back in many lanes, and a step of Adam.
 
 import { Lanes } from "./lanes.js";
 import { Adam, Network } from "./network.js";

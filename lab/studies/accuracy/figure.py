@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from baselines.figures.style import COLUMN, LINES, STYLE, headline, legend_below, log_ticks, look, save
 from birthsim_env.physics.compiled.lanes import Array
+from lab.engine.tables import digits
 from lab.studies.accuracy.errors import ADAPTIVE, EVALUATIONS
 
 LOST = 1e5
@@ -31,8 +32,8 @@ def accuracy_figure(found: dict[str, Any], folder: Path) -> list[Path]:
         methods = found["motions"][names[0]]["methods"]
         present = np.argmin(np.abs(np.array(found["steps_s"]) - found["present_step_s"]))
         errors = {name: float(np.median(_micrometres(one["position_m"])[present])) for name, one in methods.items()}
-        said = ", ".join(f"{error:.2g} µm ({name})" for name, error in errors.items())
-        headline(figure, f"Errors at a step of {1e3 * found['present_step_s']:g} ms, {names[0]}: {said}")
+        said = ", ".join(f"{digits(error)} µm ({name})" for name, error in errors.items())
+        headline(figure, f"Errors at a step of {1e3 * found['present_step_s']:.3g} ms, {names[0]}: {said}")
         legend_below(figure)
         return save(figure, folder, "accuracy")
 
@@ -55,7 +56,7 @@ def _against_step(axes: Axes, found: dict[str, Any], name: str) -> None:
     axes.axvline(1e3 * found["present_step_s"], color="black", ls=LINES[3], label="the plant's step")
     axes.set(xscale="log", yscale="log", xlabel="step (ms)")
     axes.set_title(f"{name}: {clear.sum()} rigs")
-    axes.set_xticks(steps[::2], [f"{step:g}" for step in steps[::2]], minor=False)
+    axes.set_xticks(steps[::2], [f"{step:.2g}" for step in steps[::2]], minor=False)
     axes.minorticks_off()
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.engine.tables import digits
 from lab.studies.accuracy.errors import EVALUATIONS, SHIPPED
 
 
@@ -20,16 +21,17 @@ def by_step(found: dict[str, Any], motion: str) -> str:
     lines = [
         f'Motion "{motion}", {clear.sum()} of {len(clear)} rigs (the others met an end stop, which the reference has not):',
         "",
-        "| method | step (ms) | evaluations per ms | position, median (um) | largest (um) | pressure, median | largest |",
+        "| method | step, ms | evaluations per ms | position, um: median | position, um: largest "
+        "| pressure, ppm: median | pressure, ppm: largest |",
         "|---|---|---|---|---|---|---|",
     ]
     for method, values in measured["methods"].items():
         for k, step in enumerate(found["steps_s"]):
             position = 1e6 * _row(values["position_m"][k], clear)
-            pressure = _row(values["pressure_relative"][k], clear)
+            pressure = 1e6 * _row(values["pressure_relative"][k], clear)
             shipped = method == SHIPPED and step == found["present_step_s"]
             cells = [
-                f"{method}, the plant's" if shipped else method, f"{1e3 * step:g}", f"{1e-3 * EVALUATIONS[method] / step:g}",
+                f"{method}, the plant's" if shipped else method, f"{1e3 * step:.3g}", f"{1e-3 * EVALUATIONS[method] / step:g}",
                 *(number(v) for v in (np.median(position), position.max(), np.median(pressure), pressure.max())),
             ]  # fmt: skip
             lines.append("| " + " | ".join(f"**{cell}**" if shipped else cell for cell in cells) + " |")
@@ -48,7 +50,7 @@ def worst(found: dict[str, Any], motion: str) -> tuple[float, float, str]:
 def adaptive(found: dict[str, Any]) -> str:
     """Errors of adaptive methods on the first rig, a row per method and tolerance."""
     names = list(found["motions"])
-    heads = [f"{name}: evaluations per ms | position (um) | pressure" for name in names]
+    heads = [f"{name}: evaluations per ms | {name}: position, um | {name}: pressure, ppm" for name in names]
     lines = [
         f"Adaptive methods of SciPy's on the {found['rigs'][0]} rig, started anew at every change of the inputs:", "",
         f"| method | relative tolerance | {' | '.join(heads)} |", "|---|---|" + "---|---|---|" * len(names),
@@ -57,7 +59,7 @@ def adaptive(found: dict[str, Any]) -> str:
         cells = [rows[0]["method"], f"{rows[0]['tolerance']:.0e}"]
         for row in rows:
             position = 1e6 * row["position_m"] if row["position_m"] is not None else np.inf
-            cells += [f"{row['evaluations_per_ms']:.1f}", number(position), number(row["pressure_relative"])]
+            cells += [f"{row['evaluations_per_ms']:.1f}", number(position), number(_ppm(row["pressure_relative"]))]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
@@ -66,12 +68,12 @@ def laws(found: dict[str, Any]) -> str:
     """Errors of the plant as it is by friction law, on the first rig."""
     lines = [
         f"The plant as it is on the {found['rigs'][0]} rig, by friction law:", "",
-        "| friction law | motion | position (um) | pressure |", "|---|---|---|---|",
+        "| friction law | motion | position, um | pressure, ppm |", "|---|---|---|---|",
     ]  # fmt: skip
     for law, motions in found["laws"].items():
         for motion, row in motions.items():
             position = 1e6 * row["position_m"] if row["position_m"] is not None else np.inf
-            lines.append(f"| {law} | {motion} | {number(position)} | {number(row['pressure_relative'])} |")
+            lines.append(f"| {law} | {motion} | {number(position)} | {number(_ppm(row['pressure_relative']))} |")
     return "\n".join(lines)
 
 
@@ -93,10 +95,12 @@ def orders(found: dict[str, Any]) -> str:
 
 
 def number(value: float | None) -> str:
-    """Two digits; a run that blew up is unstable."""
-    if value is None or not np.isfinite(value):
-        return "unstable"
-    return f"{value:.0f}" if 10 <= value < 1e4 else f"{value:.2g}"
+    """Three digits; a run that blew up is unstable."""
+    return "unstable" if value is None or not np.isfinite(value) else digits(value)
+
+
+def _ppm(value: float | None) -> float | None:
+    return None if value is None else 1e6 * value
 
 
 def _row(values: list[float | None], chosen: Any = slice(None)) -> Any:

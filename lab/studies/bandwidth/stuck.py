@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from baselines.bench.statistics import number, quantile
+from baselines.bench.statistics import quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linkage.geometry import inverse_geometry, jacobian
@@ -28,7 +28,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, markdown
 from lab.studies.bandwidth.stimuli import KINDS, Stimulus, stimuli, words_of
 from lab.studies.haptics.worlds import DIRECTIONS, POSES, Condition
 
@@ -152,13 +152,14 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     settings = content["settings"]
-    rows = [["sensors", "what the hand does", "axis", *(f"below {band:g} Hz" for band in TOLD)]]
+    heads = [Head(f"below {band:g} Hz", ("median", "worst")) for band in TOLD]
+    rows: list[list[Cell | Head]] = [["sensors", "what the hand does", "axis", *heads]]
     for row in content["figures"]:
-        errors = ["; ".join(number(100 * value) for value in own) for own in row["errors"]]
+        errors = [[100 * value for value in own] for own in row["errors"]]
         rows.append([", ".join(row["sensors"]), words_of(row["push"], settings["seed"]), row["axis"], *errors])
     first, count = settings["seed"], settings["rigs"]
     said = (
-        "Error of the force that the best causal filter finds while pistons stick, % of that force: median and worst of "
+        "Error of the force that the best causal filter finds while pistons stick, % of that force, over "
         f"{count} randomised rigs, seeds {first} to {first + count - 1}. Those lines push that are below the frequency."
     )
     return {"stuck.md": f"{said}\n\n{markdown(rows)}\n"}

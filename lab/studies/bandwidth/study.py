@@ -7,7 +7,7 @@ import numpy as np
 from baselines.bench.pieces import controller_settings, file_stem
 from baselines.bench.probes import board_limit
 from baselines.bench.resting import RestingRigs
-from baselines.bench.statistics import crossed_interval, number, quantile
+from baselines.bench.statistics import crossed_interval, quantile
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Complex, declared_by, mass_spring_damper
 from baselines.work.tasks import Result, Task
@@ -19,7 +19,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, digits, markdown
 from lab.studies.bandwidth.stimuli import KINDS, Multisine, stimuli, words_of
 from lab.studies.bandwidth.valves import commanded_openings
 from lab.studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
@@ -60,7 +60,7 @@ MEASURED = (
 
 SAID = (
     "A bandwidth belongs to its push. *Lines* are sines at once: of a multisine those below 1 Hz, and after these those from 1 "
-    "to 20 Hz, 20 a decade. A *lone sine* is one at a time. Cells: median over the rigs, its 95 % interval; the worst rig."
+    "to 20 Hz, 20 a decade. A *lone sine* is one at a time. Medians and worst are over the rigs."
 )
 """Above the table."""
 
@@ -199,21 +199,26 @@ def _kept(options: Options, found: Found) -> Any:
     return {"columns": COLUMNS, "rows": rows}
 
 
+def _entry(median: float, low: float, high: float, worst: float) -> list[str | float]:
+    return [f"{digits(median)} [{digits(low)}, {digits(high)}]", worst]
+
+
 def _shown(content: Content) -> dict[str, str]:
-    head = ["sensors", "what the hand does", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]
-    rows = [["controller", *information.COLUMNS, *head]]
+    statistics = ("median [95 % interval]", "worst")
+    heads = [Head(quantity, statistics) for quantity in ("bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz")]
+    head: list[Cell | Head] = ["controller", *information.COLUMNS, "sensors", "axis", *heads, "lost"]
+    of = dict[str, list[list[Cell | Head]]]()
     for row in content["figures"]["rows"]:
-        cells = [
-            "-" if row[first] is None else "{} [{}, {}]; {}".format(*map(number, row[first : first + 4]))
-            for first in (4, 8, 12)
-        ]
-        push = words_of(row[2], content["settings"]["seed"])
+        cells = ["-" if row[first] is None else _entry(*row[first : first + 4]) for first in (4, 8, 12)]
         model, file = RIGS[row[1]]
         rig = information.TOLD if row[1] == KNOWN else information.DEFAULT
         facts = information.informed(row[0], model, rig=rig, parameters=file or "")
-        rows.append([row[0], *facts, row[1], push, row[3], *cells, str(row[-1])])
-    alike = [(row[1], *row[3:7]) for row in rows[1:]]
-    return {"bandwidth.md": f"{SAID} {information.LEGEND}\n\n{markdown(rows, most=rows[0][7:9], alike=alike)}\n"}
+        of.setdefault(row[2], []).append([f"`{row[0]}`", *facts, row[1], row[3], *cells, str(row[-1])])
+    parts = [f"{SAID} {information.LEGEND}"]
+    for push, rows in of.items():
+        alike = [tuple(map(str, (row[1], *row[3:6]))) for row in rows]
+        parts += [f"## {words_of(push, content['settings']['seed'])}", markdown([head, *rows], most=heads[:2], alike=alike)]
+    return {"bandwidth.md": "\n\n".join(parts) + "\n"}
 
 
 STUDY = Study(

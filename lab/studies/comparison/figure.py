@@ -3,12 +3,11 @@
 import re
 from collections import Counter
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 from matplotlib import pyplot as plt
 
-from baselines.figures.style import COLUMN, DARK, MIDDLE, PAGE, STYLE, headline, label_of, legend_below, log_ticks, look, save
+from baselines.figures.style import DARK, MIDDLE, PAGE, STYLE, headline, label_of, legend_below, log_ticks, save
 from lab.studies.comparison.grid import known
 from lab.studies.comparison.tables import CIRCLE, Figures, controllers_of
 
@@ -23,9 +22,6 @@ CONDITIONS = {
     ("honest", "described-sensors"): {"marker": "D", "color": MIDDLE, "mfc": MIDDLE},
 }
 """Sensors and plant -> how they look."""
-
-NARROW = 12
-"""So many controllers have a legend that a column takes."""
 
 
 def draw_comparison(figures: Figures, folder: Path) -> list[Path]:
@@ -59,7 +55,15 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
                 if key == first[0]:
                     least[environment] = min(least.get(environment, (np.inf, "")), (found["median"], cell["controller"]))
             elif np.isinf(found["median"]):
-                axes.text(high / 1.05, row, "lost", ha="right", va="center", fontsize=7, color=style["color"])
+                axes.text(
+                    high / 1.05,
+                    row,
+                    "lost",
+                    ha="right",
+                    va="center",
+                    fontsize=plt.rcParams["xtick.labelsize"],
+                    color=style["color"],
+                )
         axes.set(xscale="log", xlim=(low, high), title=re.sub(r"^BirthSIM/|-v\d+$", "", environment))
         axes.set_xlabel("error (mm)")
         log_ticks(axes.xaxis, 1.0)
@@ -86,38 +90,42 @@ def _limits(figures: Figures, metric: str) -> tuple[float, float]:
 
 
 def air_figure(figures: Figures, folder: Path) -> list[Path]:
-    """Air used against settled error, a marker per controller, on the nominal plant: medians with their intervals."""
+    """Settled error beside the air used, a row per controller, on the nominal plant: medians with their intervals."""
     environments = [cell["environment"] for cell in figures]
     environment = CIRCLE if CIRCLE in environments else environments[0]
     plants = [cell["plant"] for cell in figures]
     plant = "nominal" if "nominal" in plants else plants[0]
     here = [cell for cell in figures if (cell["environment"], cell["plant"]) == (environment, plant)]
-    names = controllers_of(figures)
-    sensors = list(dict.fromkeys(cell["sensors"] for cell in here))
-    width = COLUMN if len(sensors) < 3 and len(names) <= NARROW else PAGE
-    figure, panels = plt.subplots(1, len(sensors), figsize=(width, 4.0), layout="constrained", sharey=True, squeeze=False)
-    top = _limits(here, "air")[1]
-    for axes, kind in zip(panels[0], sensors, strict=True):
-        shown = [cell for cell in here if cell["sensors"] == kind]
-        left, right = _limits(shown, "settled_rms")
-        for cell in shown:
-            error, air = cell["metrics"]["settled_rms"], cell["metrics"]["air"]
-            style = look(names.index(cell["controller"]))
-            if np.isfinite([error["median"], air["median"]]).all():
-                axes.hlines(air["median"], error["low"], min(error["high"], right), color=style["color"], lw=0.9)
-                axes.vlines(error["median"], air["low"], min(air["high"], top), color=style["color"], lw=0.9)
-                axes.plot(error["median"], air["median"], **style | {"linestyle": ""}, ms=5, label=label_of(cell["controller"]))
-        lost = [cell["controller"] for cell in shown if np.isinf(cell["metrics"]["settled_rms"]["median"])]
-        title = f"{kind} sensors" + (
-            fill(f"; not shown, for they lose episodes: {', '.join(map(label_of, lost))}", 34) if lost else ""
-        )
-        axes.set(xscale="log", xlim=(left, right), ylim=(0, top), xlabel="settled error (mm)")
-        axes.set_title(title)
-        log_ticks(axes.xaxis, 1.0)
-    panels[0, 0].set_ylabel("air used (normal l/min)")
-    short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
     lowest = min(here, key=lambda cell: cell["metrics"]["settled_rms"]["median"])
+    names = sorted(controllers_of(here), key=lambda name: _error_of(here, name))
+    sensors = list(dict.fromkeys(cell["sensors"] for cell in here))
+    size = PAGE, 1.2 + 0.17 * len(names)
+    figure, (left, right) = plt.subplots(1, 2, figsize=size, layout="constrained", sharey=True)
+    left.set(xscale="log", xlim=_limits(here, "settled_rms"))
+    right.set_xlim(0, _limits(here, "air")[1])
+    for axes, metric in ((left, "settled_rms"), (right, "air")):
+        top = axes.get_xlim()[1]
+        for cell in here:
+            style, found = CONDITIONS[cell["sensors"], plant], cell["metrics"][metric]
+            row = names.index(cell["controller"]) + 0.5 * ((sensors.index(cell["sensors"]) + 0.5) / len(sensors) - 0.5)
+            if np.isfinite(found["median"]):
+                axes.hlines(row, found["low"], min(found["high"], top), color=style["color"], lw=0.9)
+                axes.plot(found["median"], row, ls="", ms=3.5, **style, label=f"{cell['sensors']} sensors")
+        axes.grid(axis="y", visible=False)
+        for row in range(1, len(names)):
+            axes.axhline(row - 0.5, color="black", alpha=0.15, lw=0.6)
+    log_ticks(left.xaxis, 1.0)
+    left.set_xlabel("settled error (mm)")
+    right.set_xlabel("air used (normal l/min)")
+    left.set_yticks(range(len(names)), [label_of(name) for name in names])
+    left.set_ylim(len(names) - 0.5, -0.5)
+    short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
     error, air = (lowest["metrics"][kind]["median"] for kind in ("settled_rms", "air"))
     headline(figure, f"Least error: {label_of(lowest['controller'])}, {error:.2g} mm with {air:.2g} l/min")
     legend_below(figure, said=f"{short}, {plant.replace('drawn-sensors', 'nominal')} rig: medians with 95 % intervals")
     return save(figure, folder, "air_against_error")
+
+
+def _error_of(figures: Figures, name: str) -> float:
+    """The mean of a controller's medians over sensors, on a logarithmic scale, by which rows are sorted."""
+    return float(np.mean([np.log(cell["metrics"]["settled_rms"]["median"]) for cell in figures if cell["controller"] == name]))

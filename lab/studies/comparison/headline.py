@@ -1,13 +1,12 @@
-"""The table of README: what each controller is told, and its settled error on the circle with every kind of sensors."""
+"""The table of the circle: what each controller is told, and its settled error for each kind of sensors."""
 
 import numpy as np
 
 from agents.policy.files import read_policy
 from agents.policy.seeds import policy_folders
-from baselines.bench.statistics import number
 from birthsim_env.registry import entries
 from lab.engine import information
-from lab.engine.tables import markdown
+from lab.engine.tables import digits, markdown
 from lab.studies.comparison.grid import LEARNED, Conditions
 from lab.studies.comparison.privileged import TOLD
 from lab.studies.comparison.tables import Figures, controllers_of
@@ -72,4 +71,4 @@ def headline(figures: Figures) -> str:
 def _short(found: dict[str, float]) -> str:
     """A median with its interval, whose ends have two digits, so that four of them stand side by side."""
     low, high = ("lost" if np.isinf(found[end]) else f"{found[end]:.2g}" for end in ("low", "high"))
-    return f"{number(found['median'])} [{low}, {high}]"
+    return f"{digits(found['median'])} [{low}, {high}]"

@@ -75,35 +75,32 @@ def _label(name: str, values: Array) -> str:
     return f"{label_of(name)} ({lost} of {values.size} lost)" if lost else label_of(name)
 
 
-def _percent_axis(axes: Axes, linear: float) -> None:
-    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:+g}".replace("-", "−") if value else "0")
-    axes.axhline(0, color="black", lw=0.8)
-
-
 def stiffness_figure(study: Study, folder: Path) -> list[Path]:
-    """Rendered against asked-for stiffness: median and range over poses, axes and forces, one line per controller."""
-    figure, axes = plt.subplots(figsize=(PAGE, 3.4 + 0.07 * len(study)), layout="constrained")
-    within = 0
-    for k, (name, result) in enumerate(study.items()):
+    """Rendered against asked-for stiffness: a row per controller, a mark per setpoint, median and range over poses, axes and
+    forces."""
+    figure, axes = plt.subplots(figsize=(PAGE, 1.2 + 0.24 * len(study)), layout="constrained")
+    within, labels = 0, []
+    setpoints = list(dict.fromkeys(setpoint for result in study.values() for setpoint in result["setpoints"]))
+    for row, (name, result) in enumerate(study.items()):
         errors = _numbers(result["error_percent"])
-        low, middle, high = _spread(errors)
-        within += bool(np.abs(middle).max() <= EXACT)
-        # Beside each other, or the ranges would hide one another.
-        place = np.array(result["setpoints"]) * 1.22 ** (k / len(study) - 0.5)
-        axes.plot(place, middle, **look(k), lw=0.8, label=_label(name, errors))
-        axes.vlines(place, low, high, color=look(k)["color"], lw=0.8)
-    _percent_axis(axes, 1.0)
-    axes.set(
-        xscale="log",
-        xlabel="closed-loop stiffness setpoint (N/m)",
-        ylabel="error of the stiffness (%)",
-    )
-    ticks = next(iter(study.values()))["setpoints"]
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.set_xticks([], minor=True)
+        within += bool(np.abs(_spread(errors)[1]).max() <= EXACT)
+        labels.append(_label(name, errors))
+        for setpoint, low, middle, high in zip(result["setpoints"], *_spread(errors), strict=True):
+            k = setpoints.index(setpoint)
+            place, style = row + 0.7 * ((k + 0.5) / len(setpoints) - 0.5), {**look(k), "linestyle": ""}
+            axes.hlines(place, low, high, color=style["color"], lw=0.8)
+            axes.plot(middle, place, **style, ms=3, label=f"{setpoint:g} N/m")
+        if row:
+            axes.axhline(row - 0.5, color="black", alpha=0.15, lw=0.6)
+    axes.set_xscale("symlog", linthresh=1.0, linscale=0.6)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:+g}".replace("-", "−") if value else "0")
+    axes.axvline(0, color="black", lw=0.8)
+    axes.set_xlabel("error of the stiffness (%)")
+    axes.set_yticks(range(len(study)), labels)
+    axes.set_ylim(len(study) - 0.5, -0.5)
+    axes.grid(axis="y", visible=False)
     headline(figure, f"{within} of {len(study)} controllers render stiffness to {EXACT:g} % (medians)")
-    legend_below(figure, said="median and range over poses, axes and forces")
+    legend_below(figure, said="stiffness setpoint: median and range over poses, axes and forces")
     return save(figure, folder, "rendered_stiffness")
 
 
@@ -131,7 +128,7 @@ def hunting_figure(study: Study, folder: Path) -> list[Path]:
     axes.invert_yaxis()
     still = sum(bool(some.size) and np.median(some) <= STILL for some in cases)
     headline(figure, f"{still} of {len(study)} controllers rest within {STILL:g} mm (medians)")
-    figure.supxlabel("quartiles and range over setpoints, poses, axes, forces", fontsize=7)
+    figure.supxlabel("quartiles and range over setpoints, poses, axes, forces", fontsize=plt.rcParams["xtick.labelsize"])
     return save(figure, folder, "hunting")
 
 
@@ -253,8 +250,8 @@ def ellipse_figure(study: Study, folder: Path) -> list[Path]:
         axes.set(xlim=(355, 645), ylim=(-130, 95))
         if k == 0:
             axes.plot([365, 365 + 1e6 * ELLIPSE_SCALE], [-124, -124], color="black", lw=2)
-            axes.text(370 + 1e6 * ELLIPSE_SCALE, -125, "1000 N/m", fontsize=7, va="center")
-    figure.supylabel("y (mm), below x (mm)", fontsize=7.5)
+            axes.text(370 + 1e6 * ELLIPSE_SCALE, -125, "1000 N/m", fontsize=plt.rcParams["xtick.labelsize"], va="center")
+    figure.supylabel("y (mm), below x (mm)", fontsize=plt.rcParams["font.size"])
     (kx, kxy), (_, ky) = wanted
     headline(figure, f"{alike} of {len(study)} controllers render the stiffness matrix to {EXACT:g} % (medians)")
     legend_below(

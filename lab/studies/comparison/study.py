@@ -135,10 +135,10 @@ def tables(content: Content, name: str) -> dict[str, str]:
     figures, settings = cells_of(content), content["settings"]
     several = len({cell["environment"] for cell in figures}) > 1
     parts = [
-        f"{measured_on(settings)} Medians with 95 % bootstrap intervals; a lost episode counts as infinitely bad. {LEGEND}",
+        f"{measured_on(settings)} Intervals are bootstrapped; a lost episode counts as infinitely bad. {LEGEND}",
         overview(figures), *([losses(figures)] if several else []),
         "Every metric, with its interval, its worst episode and its ratio to that of the paper's controller: "
-        f"[{name}.csv](data/{name}.csv)",
+        f"[{name}.csv](../data/{name}.csv)",
     ]  # fmt: skip
     return {f"{name}.md": "\n\n".join(parts) + "\n", f"{name}.csv": data(figures)}
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from baselines.bench.statistics import number
 from lab.engine import information
-from lab.engine.tables import markdown
+from lab.engine.tables import SPREAD, SPREAD_AND_WORST, Cell, Head, digits, markdown
 from lab.studies.comparison.grid import METRICS, MOVING, RIGS
 
 Figures = Sequence[dict[str, Any]]
@@ -38,7 +38,7 @@ RATIO = ("ratio", "ratio_low", "ratio_high")
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the overview: a metric under some conditions; with ``worst`` beside its median.
+    """Columns of the overview: a metric under some conditions, its median with an interval or, with ``worst``, the worst.
 
     ``hand`` is one of ``MOVING``, or "" for the environment's own."""
 
@@ -55,28 +55,34 @@ class Column:
         """Environment, sensors, plant and moving hand, as a cell has them."""
         return self.environment, self.sensors, self.plant, self.hand
 
-    def text(self, figures: dict[str, Any]) -> str:
-        """The entry of one cell."""
-        found = figures["metrics"].get(self.metric)
-        if found is None:
+    @property
+    def head(self) -> Head:
+        """Its title and statistics."""
+        return Head(self.title, ("median", "worst") if self.worst else (INTERVAL,))
+
+    def entry(self, figures: dict[str, Any] | None) -> Cell:
+        """What stands below its head."""
+        found = figures and figures["metrics"].get(self.metric)
+        if not found:
             return "-"
-        return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
+        return [found["median"], found["worst"]] if self.worst else [interval(found)]
 
 
+INTERVAL = "median [95 % interval]"
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v2", "BirthSIM/Probe-v3", "BirthSIM/Forceps-v2"
 COLUMNS = (
-    Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
-    Column("the same, lab sensors, mm", CIRCLE, "lab", "randomised", "settled_rms"),
-    Column("rendered stiffness off by, % (median; worst)", PROBE, "ideal", "nominal", "stiffness_error", worst=True),
-    Column("the same, lab sensors", PROBE, "lab", "nominal", "stiffness_error", worst=True),
-    Column("hunting, mm (median; worst)", PROBE, "ideal", "nominal", "hunting", worst=True),
-    Column("the same, lab sensors", PROBE, "lab", "nominal", "hunting", worst=True),
-    Column("air, l/min", CIRCLE, "ideal", "nominal", "air"),
+    Column("settled error of circles, ideal sensors, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
+    Column("settled error of circles, lab sensors, mm", CIRCLE, "lab", "randomised", "settled_rms"),
+    Column("stiffness error, ideal sensors, %", PROBE, "ideal", "nominal", "stiffness_error", worst=True),
+    Column("stiffness error, lab sensors, %", PROBE, "lab", "nominal", "stiffness_error", worst=True),
+    Column("hunting, ideal sensors, mm", PROBE, "ideal", "nominal", "hunting", worst=True),
+    Column("hunting, lab sensors, mm", PROBE, "lab", "nominal", "hunting", worst=True),
+    Column("air, ideal sensors, l/min", CIRCLE, "ideal", "nominal", "air"),
     Column("air, lab sensors, l/min", CIRCLE, "lab", "nominal", "air"),
     Column("valve turns, lab sensors, 1/s", CIRCLE, "lab", "nominal", "valve_turns"),
     Column("valve travel, lab sensors, 1/s", CIRCLE, "lab", "nominal", "valve_travel"),
     *(
-        Column(f"circle, {hand} hand, lab sensors: settled error, mm", CIRCLE, "lab", "randomised", "settled_rms", hand=hand)
+        Column(f"settled error of circles, {hand} hand, lab sensors, mm", CIRCLE, "lab", "randomised", "settled_rms", hand=hand)
         for hand in MOVING
     ),
 )
@@ -84,7 +90,7 @@ COLUMNS = (
 
 def interval(found: dict[str, Any]) -> str:
     """A median with its 95 % interval."""
-    return f"{number(found['median'])} [{number(found['low'])}, {number(found['high'])}]"
+    return f"{digits(found['median'])} [{digits(found['low'])}, {digits(found['high'])}]"
 
 
 def controllers_of(figures: Figures) -> list[str]:
@@ -97,23 +103,22 @@ def overview(figures: Figures) -> str:
     found = {(cell["controller"], *_place(cell)): cell for cell in figures}
     columns = [column for column in COLUMNS if any(key[1:] == column.conditions for key in found)]
     sensors = list(dict.fromkeys(column.sensors for column in columns))
-    rows = [["controller", *information.COLUMNS, *(column.title for column in columns), "lost episodes"]]
+    heads = [column.head for column in columns]
+    rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *heads, "lost episodes"]]
     for name in controllers_of(figures):
-        row = [name, *information.informed(name, *sensors)]
-        for column in columns:
-            cell = found.get((name, *column.conditions))
-            row.append("-" if cell is None else column.text(cell))
+        row = [f"`{name}`", *information.informed(name, *sensors)]
+        entries = [column.entry(found.get((name, *column.conditions))) for column in columns]
         own = [cell for cell in figures if cell["controller"] == name]
-        rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}"])
-    return markdown(rows, [column.title for column in columns], alike=[(row[1], row[3]) for row in rows[1:]])
+        rows.append([*row, *entries, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}"])
+    return markdown(rows, heads, alike=[(row[1], row[3]) for row in rows[1:]])
 
 
 def losses(figures: Figures) -> str:
     """Lost episodes: one row per controller, one column per environment, over all sensor models and plants."""
     environments = list(dict.fromkeys(cell["environment"] for cell in figures))
-    rows = [["lost episodes", *environments]]
+    rows = [["lost episodes", *map(_short, environments)]]
     for name in controllers_of(figures):
-        row = [name]
+        row = [f"`{name}`"]
         for environment in environments:
             own = [cell for cell in figures if (cell["controller"], cell["environment"]) == (name, environment)]
             row.append(f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}" if own else "-")
@@ -125,18 +130,17 @@ def settled(figures: Figures) -> str:
     """Settled error, mm, by controller, environment and sensors: median and 95 %, and how many of the episodes were lost."""
     kinds = list(dict.fromkeys((cell["environment"], cell["sensors"]) for cell in figures))
     several = len({environment for environment, _ in kinds}) > 1
-    titles = [f"{_short(environment)}, " * several + f"{sensors} sensors" for environment, sensors in kinds]
+    titles = [Head(f"{_short(environment)}, " * several + f"{sensors} sensors", SPREAD) for environment, sensors in kinds]
     found = {(cell["controller"], (cell["environment"], cell["sensors"])): cell for cell in figures}
     names = controllers_of(figures)
     lost_of = "" if several else f", {' and '.join(sensors for _, sensors in kinds)}"
-    rows = [["controller", *information.COLUMNS, *titles, f"lost{lost_of}"]]
+    rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *titles, f"lost{lost_of}"]]
     for name in names:
         own = [found[name, kind] for kind in kinds]
         errors = [[cell["metrics"]["settled_rms"][key] for key in ("median", "q95")] for cell in own]
-        cells = ["; ".join(map(number, error)) for error in errors]
         lost = " and ".join(str(cell["lost"]) for cell in own)
         facts = information.informed(name, *(sensors for _, sensors in kinds))
-        rows.append([f"`{name}`", *facts, *cells, f"{lost} of {own[0]['episodes']}"])
+        rows.append([f"`{name}`", *facts, *errors, f"{lost} of {own[0]['episodes']}"])
     return markdown(rows, titles, alike=[(row[1], row[3]) for row in rows[1:]])
 
 
@@ -156,8 +160,10 @@ def by_sensors(figures: Figures, parameters: str = "") -> str:
     """What sensors cost on randomised rigs: median, 95 % and worst per controller and ``KINDS``, a column per hand; controllers
     believe the rig of a file, ``parameters``."""
     found = {(cell["controller"], *_place(cell)): cell for cell in figures}
-    head = ["sensors", "Probe: stiffness error, %", "hunting, mm", "settled error, mm", "Circle: settled error, mm"]
-    rows = [["controller", *information.COLUMNS, *head, *(f"Circle, {hand} hand" for hand in MOVING), "lost"]]
+    quantities = ["Probe: stiffness error, %", "Probe: hunting, mm", "Probe: settled error, mm", "Circle: settled error, mm"]
+    quantities += [f"Circle, {hand} hand: settled error, mm" for hand in MOVING]
+    heads = [Head(quantity, SPREAD_AND_WORST) for quantity in quantities]
+    rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, "sensors", *heads, "lost"]]
     columns = [(PROBE, "", metric) for metric in ("stiffness_error", "hunting", "settled_rms")]
     columns += [(CIRCLE, hand, "settled_rms") for hand in ("", *MOVING)]
     for name in controllers_of(figures):
@@ -165,13 +171,10 @@ def by_sensors(figures: Figures, parameters: str = "") -> str:
             cells = [found.get((name, environment, *kind, hand)) for environment, hand, _ in columns]
             if None not in cells:
                 own = [(cell, metric) for cell, (*_, metric) in zip(cells, columns, strict=True) if cell]
-                three = [
-                    ", ".join(number(cell["metrics"][metric][key]) for key in ("median", "q95", "worst"))
-                    for cell, metric in own
-                ]
+                three = [[cell["metrics"][metric][key] for key in ("median", "q95", "worst")] for cell, metric in own]
                 facts = information.informed(name, kind[0], parameters=parameters)
-                rows.append([name, *facts, words, *three, str(sum(cell["lost"] for cell, _ in own[2:]))])
-    return markdown(rows, rows[0][5:-1], alike=[(row[4], row[1], row[3]) for row in rows[1:]])
+                rows.append([f"`{name}`", *facts, words, *three, str(sum(cell["lost"] for cell, _ in own[2:]))])
+    return markdown(rows, heads, alike=[(row[4], row[1], row[3]) for row in rows[1:]])
 
 
 def data(figures: Figures) -> str:

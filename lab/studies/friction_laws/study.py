@@ -20,7 +20,7 @@ from lab.engine import information
 from lab.engine.information import Row
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.comparison.grid import Conditions, cell_task, gather, settings_of
 from lab.studies.comparison.privileged import TOLD
@@ -80,6 +80,11 @@ def _kept(options: Options, found: Found) -> Any:
     return jsonable(figures)
 
 
+PARTS = ("median", "90 %")
+FRICTIONS = {"as expected": PARTS, "under the worst friction": (*PARTS, "which")}
+"""Frictions of the summary, and what stands of each."""
+
+
 def _size(value: float | str) -> float:
     return np.inf if isinstance(value, str) else value
 
@@ -89,24 +94,28 @@ def _shown(content: Content) -> dict[str, str]:
     for one in content["figures"]:
         found.setdefault(Row(one["controller"], one["rig"], one["file"]), {})[one["friction"]] = one
     heads = [head for _, head in METRICS.values()]
-    whole = [
-        ["controller", *information.COLUMNS, *(f"{head}: {of}" for head in heads for of in ("as expected", "worst")), "lost"]
+    whole: list[list[Cell | Head]] = [
+        [
+            *("controller", *information.COLUMNS),
+            *(Head(head.replace(", ", f" {of}, "), parts) for head in heads for of, parts in FRICTIONS.items()),
+            "lost",
+        ]
     ]
     for row, by in found.items():
-        figures = []
+        figures: list[Cell] = []
         for metric in METRICS:
             worst = max(by, key=lambda friction: _size(by[friction][metric][1]))
-            figures += [cells(by[ASSUMED][metric]) if ASSUMED in by else "", f"{cells(by[worst][metric])} `{worst}`"]
+            figures += [by[ASSUMED][metric] if ASSUMED in by else "", [*by[worst][metric], f"`{worst}`"]]
         lost = sum(one["lost"] for one in by.values())
         whole.append([row.name, *row.facts(SENSORS), *figures, str(lost)])
     tables = []
     for metric, (_, head) in METRICS.items():
-        rows = [["friction", *(row.name for row in found)]]
+        rows: list[list[Cell | Head]] = [["friction", *(Head(row.name, PARTS) for row in found)]]
         for friction in settings["friction"]:
-            rows.append([f"`{friction}`", *(cells(by[friction][metric]) for by in found.values())])
+            rows.append([f"`{friction}`", *(by[friction][metric] for by in found.values())])
         tables.append(f"{head[0].upper()}{head[1:]}:\n\n{markdown(rows)}")
     said = (
-        f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS} sensors, rigs drawn. Cells: median, 90th percentile; as "
+        f"{worlds(settings['seed'], settings['episodes'])}, {SENSORS} sensors, rigs drawn. 90 % is the 90th percentile; as "
         f"expected is `{ASSUMED}`, worst the friction with the largest 90th percentile."
     )
     summary = f"{said} {information.LEGEND}\n\n{markdown(whole)}\n"

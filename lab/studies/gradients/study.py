@@ -19,7 +19,7 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, digits, markdown
 from lab.studies.gradients.figure import friction_figure
 from lab.studies.gradients.states import plant_of
 
@@ -145,12 +145,13 @@ def _shown(content: Content) -> dict[str, str]:
     cost = [["", "forward, ms", "with tape, ms", "backward, ms", "(tape + backward) / forward"]]
     for name, one in figures["cost"].items():
         times = [one[part] for part in ("forward", "taped", "backward")]
-        cost.append([name, *(f"{1e3 * spent:.3g}" for spent in times), f"{(times[1] + times[2]) / times[0]:.1f}"])
-    trust = [["pistons", "after", *(f"change {change:g}" for change in CHANGES)]]
+        cost.append([name, *(digits(1e3 * spent) for spent in times), f"{(times[1] + times[2]) / times[0]:.1f}"])
+    heads = (Head(f"change {change:g}", ("median", "90 %")) for change in CHANGES)
+    trust: list[list[Cell | Head]] = [["pistons", "after", *heads]]
     for name, errors in figures["foretold"].items():
         for duration in INSTANTS:
             row = [one for one in errors if one["after"] == duration]
-            trust.append([name, f"{1e3 * duration:g} ms", *(f"{one['median']:.1g}; {one['q90']:.1g}" for one in row)])
+            trust.append([name, f"{1e3 * duration:g} ms", *([f"{one['median']:.1g}", f"{one['q90']:.1g}"] for one in row)])
     return {"gradients_cost.md": markdown(cost) + "\n", "gradients_trust.md": markdown(trust) + "\n"}
 
 

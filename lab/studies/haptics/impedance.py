@@ -10,7 +10,7 @@ from birthsim_env.loop.signals import Mask
 from birthsim_env.physics.compiled.lanes import Array
 
 MAGNITUDE, PHASE = 0.10, 10.0
-"""Fraction and degrees within which the impedance felt is the one declared; assumed, see docs/haptics.md."""
+"""Fraction and degrees within which the impedance felt is the one declared; assumed, see docs/laboratory/haptics.md."""
 
 WEBER, WEBER_WITHOUT_WORK = 0.15, 0.22
 """Fractions of compliance that people just notice: 15 % (Bergmann Tiest and Kappers 2009); 22 % where the work done tells

@@ -46,7 +46,7 @@ def measure_rendering(stiffness: float, **settings: Any) -> Result:
 
 
 def rendering(condition: Condition, stiffness: float) -> Result:
-    """Per lane, which are poses, directions, peaks and rigs: the figures of docs/haptics.md; SI units but mm and l/min."""
+    """Per lane (pose, direction, peak, rig) the metrics of docs/laboratory/haptics.md; SI units, except mm and l/min."""
     law, each = condition.law(), condition.drawn()
     cases = list(itertools.product(POSES, DIRECTIONS, PEAKS, each))
     poses, directions, peaks, rigs = (list(side) for side in zip(*cases, strict=True))

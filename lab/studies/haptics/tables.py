@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from baselines.bench.statistics import number, quantile
+from baselines.bench.statistics import quantile
 from birthsim_env.physics.compiled.lanes import Array
 from lab.engine import information
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, markdown
 from lab.studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
 from lab.studies.haptics.kept import PEAK
 from lab.studies.haptics.multisine import words
@@ -30,13 +30,13 @@ def heading(runs: Runs) -> str:
     first = runs[0]
     randomised = f"{first['rigs']} randomised rigs, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
     rigs = randomised if first["rigs"] else "the rig as the controllers believe it"
-    cells = "Two numbers in a cell are the median and the worst over poses, directions and rigs."
+    cells = "Medians and worst are over poses, directions and rigs."
     return f"{rigs[0].upper()}{rigs[1:]}. {cells} {information.LEGEND}"
 
 
 def rendering_table(runs: Runs, parameters: str = "") -> str:
-    """Impedance, errors, energy, air and saturation at ``PEAK``; medians over lanes, with the worst behind a semicolon."""
-    rows = []
+    """Impedance, errors, energy, air and saturation at ``PEAK``: median over lanes, and worst."""
+    rows: list[list[Cell]] = []
     for run in runs:
         for piece in run.get("impedance", ()):
             kept = np.array(piece["peak"]) == PEAK
@@ -53,17 +53,19 @@ def rendering_table(runs: Runs, parameters: str = "") -> str:
                     str(int(lost.sum())),
                 ]
             )
-    columns = (
-        *WHO, "N/m", "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
-        "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %", "lost",
-    )  # fmt: skip
-    own = columns[len(WHO) + 1 : -1]
+    own = [
+        Head(quantity, WORST) for quantity in (
+            "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
+            "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %",
+        )
+    ]  # fmt: skip
+    columns: list[str | Head] = [*WHO, "N/m", *own, "lost"]
     return _table(f"### Impedance under {words(PEAK, runs[0]['seed'])}", columns, rows, own[3:], own[:3])
 
 
 def release_table(runs: Runs, parameters: str = "") -> str:
     """Overshoot, speed and energy of a pull that is let go, beside the declared impedance's."""
-    rows = []
+    rows: list[list[Cell]] = []
     for run in runs:
         for piece in run.get("release", ()):
             lost = np.array(piece["lost"], dtype=bool)
@@ -71,7 +73,9 @@ def release_table(runs: Runs, parameters: str = "") -> str:
                 name: _spread(np.where(lost, np.inf, _numbers(piece[name]))) for name in ("overshoot_mm", "speed", "kinetic")
             }
             ideal = piece["ideal"] or {}
-            wanted = {name: _spread(_numbers(ideal[name])) if ideal else "-" for name in ("overshoot_mm", "speed")}
+            wanted: dict[str, Cell] = {
+                name: _spread(_numbers(ideal[name])) if ideal else "-" for name in ("overshoot_mm", "speed")
+            }
             energy = _spread(np.where(lost, np.inf, _numbers(piece["energy"])))
             rows.append(
                 [
@@ -81,61 +85,59 @@ def release_table(runs: Runs, parameters: str = "") -> str:
                     own["speed"],
                     wanted["speed"],
                     own["kinetic"],
-                    number(piece["stored"]),
+                    float(piece["stored"]),
                     energy,
                     str(int(lost.sum())),
                 ]
             )
-    columns = (
-        *WHO, "overshoot, mm", "of the declared impedance", "peak speed, m/s", "of the declared impedance",
-        "kinetic energy, J", "stored by the spring, J", "energy given, J", "lost",
-    )  # fmt: skip
+    columns: list[str | Head] = [
+        *WHO, LEAST[0], Head("overshoot of the declared impedance, mm", WORST), LEAST[1],
+        Head("peak speed of the declared impedance, m/s", WORST), LEAST[2], "stored by the spring, J", LEAST[3], "lost",
+    ]  # fmt: skip
     return _table(f"### A pull of {PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m", columns, rows, LEAST)
 
 
 def backdriving_table(runs: Runs, parameters: str = "") -> str:
     """Mean and largest force beyond ``K x``, over poses and directions, at each setpoint."""
+    rows: list[list[Cell]] = []
     stiffnesses = list(dict.fromkeys(piece["stiffness"] for run in runs for piece in run.get("backdriving", ())))
-    rows = []
     for run in runs:
         found = {piece["stiffness"]: piece for piece in run.get("backdriving", ())}
         if found:
             rows.append([*_who(run, parameters), *(_beyond(found[stiffness]) for stiffness in stiffnesses)])
-    columns = (*WHO, *(f"at {value:g} N/m" for value in stiffnesses))
-    return _table("### Force beyond K x at 10 mm/s, N (median of the means; largest)", columns, rows, columns[len(WHO) :])
+    heads = [Head(f"at {value:g} N/m", ("median of the means", "largest")) for value in stiffnesses]
+    return _table("### Force beyond K x at 10 mm/s, N", (*WHO, *heads), rows, heads)
 
 
 def stability_table(runs: Runs, parameters: str = "") -> str:
     """Hands with which the law rests, the largest of motion, force (peak to peak) and energy, and the stiffest setpoint that is
     stable against all of ``HANDS``."""
-    rows = []
+    rows: list[list[Cell]] = []
     for run in runs:
         if not ("hands" in run or "z_width" in run):
             continue
-        cells = []
+        cells: list[Cell] = []
         for piece in run.get("hands", ()):
-            cells.append(f"{100 * np.array(piece['stable'], dtype=bool).mean():.0f} %")
-            for name in ("motion_mm", "force", "energy"):
-                values = _numbers(piece[name])
-                cells.append(number(float(np.where(np.isfinite(values), values, np.inf).max())))
+            every = [_numbers(piece[name]) for name in ("motion_mm", "force", "energy")]
+            largest = [float(np.where(np.isfinite(values), values, np.inf).max()) for values in every]
+            cells.append([f"{100 * np.array(piece['stable'], dtype=bool).mean():.0f}", *largest])
         for piece in run.get("z_width", ()):
-            cells += list(_z_width(piece))
+            cells.append(_z_width(piece))
         rows.append([*_who(run, parameters), *cells])
     held = next((run["hands"] for run in runs if "hands" in run), ())
-    columns = [*WHO]
-    for piece in held:
-        columns += [f"hands of {piece['damping']:g} N s/m: stable", "motion, mm", "force, N", "energy given, J"]
+    most = ("stable, %", "most motion, mm", "most force, N", "most energy given, J")
+    columns: list[str | Head] = [*WHO, *(Head(f"hands of {piece['damping']:g} N s/m", most) for piece in held)]
     if any("z_width" in run for run in runs):
-        columns += ["stable up to, N/m", "with the best damping, N/m"]
+        columns.append(Head("stable up to, N/m", ("own damping", "best damping")))
     title = f"### Held by hands of 0 to 20 kN/m and 0 to 2 kg at {SETPOINT:g} N/m, and Z-width against {len(HANDS)} of them"
-    best = [name for name in columns if "stable" in name or "damping" in name]
-    return _table(title, columns, rows, ("motion, mm", "force, N", "energy given, J"), best)
+    return _table(title, columns, rows, (), columns[len(WHO) :])
 
 
 UNDER_MULTISINES = ("noticed", "error_own_mm", "error_spring_mm", "energy", "shortage", "air", "saturation")
 """Figures of a lane that the table of impedances has with their worst."""
 
-LEAST = ("overshoot, mm", "peak speed, m/s", "kinetic energy, J", "energy given, J")
+WORST = ("median", "worst")
+LEAST = tuple(Head(name, WORST) for name in ("overshoot, mm", "peak speed, m/s", "kinetic energy, J", "energy given, J"))
 """Of a release."""
 
 WHO = ("controller", *information.COLUMNS, "sensors")
@@ -144,7 +146,7 @@ WHO = ("controller", *information.COLUMNS, "sensors")
 def _who(run: dict[str, Any], parameters: str) -> list[str]:
     """Of the hand's force counts what was measured: a run may hide it."""
     *facts, _ = information.informed(run["controller"], run["sensors"], parameters=parameters)
-    return [run["controller"], *facts, "yes" if run["uses_force"] else "no", run["sensors"]]
+    return [f"`{run['controller']}`", *facts, "yes" if run["uses_force"] else "no", run["sensors"]]
 
 
 def _numbers(values: Any) -> Array:
@@ -152,37 +154,41 @@ def _numbers(values: Any) -> Array:
     return np.array(values, dtype=np.float64)
 
 
-def _spread(values: Array, least: bool = False) -> str:
-    """Median; the worst, which is the largest or the ``least``."""
+def _spread(values: Array, least: bool = False) -> Cell:
+    """Median, and the worst, which is the largest or the ``least``."""
     if not np.isfinite(values).any():
         return "lost" if np.isinf(values).any() else "-"
-    return f"{number(quantile(values, 0.5))}; {number(quantile(values, 0.0 if least else 1.0))}"
+    return [quantile(values, 0.5), quantile(values, 0.0 if least else 1.0)]
 
 
-def _pair(piece: dict[str, Any], name: str, kept: Array, lost: Array, least: bool = False) -> str:
+def _pair(piece: dict[str, Any], name: str, kept: Array, lost: Array, least: bool = False) -> Cell:
     if name not in piece:
         return "-"
     return _spread(np.where(lost, 0.0 if least else np.inf, _numbers(piece[name])[kept]), least)
 
 
-def _beyond(piece: dict[str, Any]) -> str:
+def _beyond(piece: dict[str, Any]) -> Cell:
     if piece["refused"] is not None:
         return "refused"
     lost = np.array(piece["lost"], dtype=bool)
     mean, most = (np.where(lost, np.inf, _numbers(piece[name])) for name in ("mean", "most"))
-    return f"{number(quantile(mean, 0.5))}; {number(quantile(most, 1.0))}"
+    return [quantile(mean, 0.5), quantile(most, 1.0)]
 
 
-def _z_width(piece: dict[str, Any]) -> tuple[str, str]:
+def _z_width(piece: dict[str, Any]) -> list[str]:
     """The stiffest stable setpoint with damping as it is, and with the best."""
     limits = stable_up_to(piece)
     own, best = (f"{limit:g}" if limit else "none" for limit in (limits[0], max(limits)))
-    return own, best
+    return [own, best]
 
 
 def _table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], least: Sequence[str], most: Sequence[str] = ()
+    title: str,
+    columns: Sequence[str | Head],
+    rows: Sequence[Sequence[Cell]],
+    least: Sequence[object],
+    most: Sequence[object] = (),
 ) -> str:
     """Of the same sensors and told the same; impedances of the same setpoint, which follows there."""
-    alike = [(row[1], *row[3 : len(WHO) + ("N/m" in columns)]) for row in map(tuple, rows)]
+    alike = [tuple(map(str, (row[1], *row[3 : len(WHO) + ("N/m" in columns)]))) for row in rows]
     return f"{title}\n\n{markdown([columns, *rows], least, most, alike)}" if rows else ""

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from baselines.bench.statistics import number, quantile
+from baselines.bench.statistics import quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Options, Study, as_found
-from lab.engine.tables import markdown
+from lab.engine.tables import SPREAD_AND_WORST, Cell, Head, markdown
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.sensor_floor import probe_floor
 
@@ -32,11 +32,10 @@ def floor(rig: dict[str, Any], episodes: int, seed: int) -> Result:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["sensors", "stiffness error, %: median, 95th percentile, worst", "error while held, mm"]]
+    heads = (Head("stiffness error, %", SPREAD_AND_WORST), Head("error while held, mm", SPREAD_AND_WORST))
+    rows: list[list[Cell | Head]] = [["sensors", *heads]]
     for kind, found in content["figures"].items():
-        rows.append(
-            [kind.replace("drawn", "randomised"), *(", ".join(number(found[name][key]) for key in FRACTIONS) for name in UNITS)]
-        )
+        rows.append([kind.replace("drawn", "randomised"), *([found[name][key] for key in FRACTIONS] for name in UNITS)])
     return {"floor.md": markdown(rows) + "\n"}
 
 

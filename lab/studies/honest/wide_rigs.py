@@ -21,7 +21,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD_AND_WORST, Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.comparison.privileged import drawn_rigs
 
@@ -83,17 +83,24 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    titles = [f"{scenario}: {metric.split('_')[0]}, mm; beyond {most:g} mm" for scenario, (metric, most) in METRICS.items()]
-    rows = [["controller", *information.COLUMNS, *titles, "stiffness error, %"]]
+    titles = [
+        Head(
+            f"{scenario}: {'settled error' if metric == 'settled_rms' else metric}, mm",
+            (*SPREAD_AND_WORST, f"beyond {most:g} mm"),
+        )
+        for scenario, (metric, most) in METRICS.items()
+    ]
+    titles.append(Head("stiffness error, %", SPREAD_AND_WORST))
+    rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *titles]]
     for own in content["figures"]:
-        shown = {key: cells([own[key][share] for share in ("median", "q95", "worst")]) for key in (*METRICS, "stiffness_error")}
-        beyond = [f"{shown[key]}; {own[key]['beyond']} of {own[key]['of']}" for key in METRICS]
+        shown = {key: [own[key][share] for share in ("median", "q95", "worst")] for key in (*METRICS, "stiffness_error")}
+        beyond = [[*shown[key], f"{own[key]['beyond']} of {own[key]['of']}"] for key in METRICS]
         rig = information.TOLD if own["told"] else information.DEFAULT
         facts = information.informed(own["controller"], "honest", rig=rig)
         rows.append([f"`{own['controller']}`", *facts, *beyond, shown["stiffness_error"]])
     drawn = worlds(content["settings"]["seed"], content["settings"]["episodes"])
     said = f"{drawn}, of which those count that ask for at most {100 * FEASIBLE:g} % of the rig's strength."
-    table = markdown(rows, rows[0][4:], alike=[row[1] for row in rows[1:]])
+    table = markdown(rows, titles, alike=[str(row[1]) for row in rows[1:]])
     return {"wide_rigs.md": f"{said}\n\n{table}\n"}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate_worlds
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
+from baselines.bench.statistics import jsonable, penalize_lost, quantile
 from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
@@ -24,7 +24,7 @@ from birthsim_env.registry import names, register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import SPREAD_AND_WORST, Cell, Head, digits, markdown
 from lab.studies.comparison.grid import as_described
 from lab.studies.honest.search import Seeds, drawn_places, hardest, parameters_at, rigs_at
 
@@ -116,32 +116,34 @@ def _shown(content: Content) -> dict[str, str]:
     settings, metric = content["settings"], content["settings"]["metric"]
     named = f"{metric}, {UNITS[metric]}"
     head = ["controller", *information.COLUMNS, "sensors"]
-    rows = [[*head, named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
-    names = list(content["figures"][0]["found"]["figures"])
-    worlds = [[*head, "found in world", "push, N", "mm asked for", "% of the strength", *names]]
-    changed = [[*head, "parameter", "of the world found", "put to", named]]
+    above = f"above {settings['limit']:g}"
+    size, unrest = Head(named, (*SPREAD_AND_WORST, above)), Head("unrest, mm", SPREAD_AND_WORST)
+    rows: list[list[Cell | Head]] = [[*head, size, unrest, "lost", Head("worst world", ("drawn", "found"))]]
+    worlds = [[*head, "world found", "push, N", "motion asked for, mm", "of the rig's strength, %"]]
+    changed = [[*head, "parameter", "of the world, over the believed one", f"as believed: {named}"]]
     for row in content["figures"]:
         facts = information.informed(row["controller"], row["sensors"], parameters=settings["parameters"])
-        own, found = [row["controller"], *facts, row["sensors"]], row["found"]
-        sizes = [", ".join(map(_number, row[name])) for name in (metric, "unrest")]
-        listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in row["named"])
-        rows.append([*own, sizes[0], str(row["above"]), sizes[1], str(row["lost"]), listed, _number(found["size"])])
-        asked = (found["push_n"], found["way_mm"], 100 * found["strength"], *found["figures"].values())
-        worlds.append([*own, str(found["seed"]), *map(number, asked)])
-        changed += [[*own, figure, f"{was:.4g}", f"{put:.4g}", _number(size)] for figure, was, put, size in found["changes"]]
-        changed.append([*own, "all that are randomised", "", "as believed", _number(found["as_believed"])])
+        own, found = [f"`{row['controller']}`", *facts, row["sensors"]], row["found"]
+        largest = [f"{row['named'][0][0]}: {digits(row['named'][0][1])}", f"{found['seed']}: {digits(found['size'])}"]
+        rows.append([*own, [*row[metric], str(row["above"])], row["unrest"], str(row["lost"]), largest])
+        asked = (found["push_n"], found["way_mm"], 100 * found["strength"])
+        worlds.append([*own, str(found["seed"]), *map(digits, asked)])
+        for parameter, was, put, left in found["changes"]:
+            changed.append([*own, f"`{parameter}`", digits(was / put) if put else "an error, put to 0", digits(left)])
+        changed.append([*own, "all that are randomised", "", digits(found["as_believed"])])
     text = (
         f"{settings['episodes']} worlds of {ENVIRONMENT} from seed {settings['seed']}, rigs and scenarios randomised, "
-        f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst. The last column has "
-        f"what {settings['episodes']} further episodes found by moving the rigs of the worst worlds within their ranges."
+        f"{settings['rest']:g} s of rest before the push; 95 % is the 95th percentile. A *worst world* is a seed and its "
+        f"{named}: the worst that was drawn, and what {settings['episodes']} further episodes found by moving the rigs of the "
+        "worst worlds within their ranges."
     )
-    alike = [(row[4], row[1], row[3]) for row in rows[1:]]
-    tables = [markdown(rows, rows[0][5:9], alike=alike), markdown(worlds), markdown(changed)]
-    return {"worst.md": "\n\n".join([text, *tables]) + "\n"}
-
-
-def _number(value: float | str) -> str:
-    return value if isinstance(value, str) else number(value)
+    alike = [(str(row[4]), str(row[1]), str(row[3])) for row in rows[1:]]
+    parts = [text, markdown(rows, (size, unrest), alike=alike), "The worlds that were found:", markdown(worlds)]
+    cause = (
+        f"The {named} of these worlds where one parameter is as the controller believes it; in the first row of each world the "
+        "head rests twice as long:"
+    )
+    return {"worst.md": "\n\n".join(parts) + "\n", "worst-causes.md": f"{cause}\n\n{markdown(changed)}\n"}
 
 
 def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], float, float]:

@@ -19,7 +19,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, SPREAD_AND_WORST, Cell, Head, digits, markdown
 from lab.engine.worlds import worlds
 from lab.studies.learned import felt
 
@@ -115,16 +115,22 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    parts, rows = [_beside(content["figures"])], [["policy", *DATA]]
+    rows: list[list[str]] = [["policy", *DATA]]
+    parts: dict[bool, list[str]] = {True: [], False: []}
     for policy, found in content["figures"].items():
         run = RUNS[policy]
         world = f"{run.environment}, {run.episodes} episodes from seed {run.seed}, {run.sensors} sensors, randomised rigs."
-        parts += [f"## {policy}", world, *map(as_table, found["beside"].values())]
+        parts[policy.startswith("circle")] += [f"## {policy}", world, *map(as_table, found["beside"].values())]
         rows += [[policy, *row] for row in found["metrics"]["rows"]]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     summary = _summary(content["figures"])
-    return {"learned.md": "\n\n".join(parts) + "\n", "learned.csv": text.getvalue(), "residual.md": summary}
+    each = {
+        f"learned-{where}.md": "\n\n".join(parts[on_circle]) + "\n"
+        for where, on_circle in (("circle", True), ("elsewhere", False))
+        if parts[on_circle]
+    }
+    return {"learned.md": _beside(content["figures"]), **each, "learned.csv": text.getvalue(), "residual.md": summary}
 
 
 def _summary(figures: dict[str, Any]) -> str:
@@ -139,28 +145,36 @@ def _summary(figures: dict[str, Any]) -> str:
         paper, under = (own[name] for name in RUNS[policy].controllers)
         less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
         off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
-        lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
+        lines.append([policy.capitalize(), *map(digits, (paper[3], under[3], paper[4])), off])
     return f"{_worlds(shown)}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
 def _beside(figures: dict[str, Any]) -> str:
     """Policies beside classical controllers."""
-    settled, *others = [name for name, _ in COMPARED.values()]
-    rows = [["world, sensors", "controller", *information.COLUMNS, settled, *felt.COLUMNS.values(), *others, "lost"]]
+    settled, *others = [Head(name, SPREAD_AND_WORST[:count]) for name, count in COMPARED.values()]
+    heads = [settled, *(Head(name, SPREAD) for name in felt.COLUMNS.values()), *others]
+    rows: list[list[Cell | Head]] = [["world, sensors", "controller", *information.COLUMNS, *heads, "lost"]]
     alike = []
     for policy, found in figures.items():
         every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
         for controller in dict.fromkeys(row[2] for row in every):
             own = {row[0]: row[1:] for row in every if row[2] == controller}
-            tracks = [cells(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()]
-            touch = [cells(found["felt"][controller][name][:2]) for name in felt.COLUMNS]
+            tracks: list[Cell] = [
+                list(map(_number, own[metric][2 : 2 + count])) if metric in own else "-"
+                for metric, (_, count) in COMPARED.items()
+            ]
+            touch = [found["felt"][controller][name][:2] for name in felt.COLUMNS]
             learned = controller.startswith("residual")
             name = controller.replace("residual", policy) if learned else controller
             of, _, lost, *_ = own["lost episodes"]
             facts = information.informed(f"residual:{policy}" if learned else controller, RUNS[policy].sensors)
             rows.append([world, name, *facts, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
             alike.append((policy, facts[0], facts[2]))
-    return f"{_worlds(figures)} {information.LEGEND}\n\n{markdown(rows, rows[0][5:-1], alike=alike)}\n"
+    return f"{_worlds(figures)} {information.LEGEND}\n\n{markdown(rows, heads, alike=alike)}\n"
+
+
+def _number(text: str) -> float | str:
+    return float(text) if text[-1:].isdigit() else text
 
 
 def _worlds(policies: Iterable[str]) -> str:

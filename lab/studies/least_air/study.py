@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import evaluate
-from baselines.bench.statistics import number
 from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import environment_id, find_scenario
@@ -15,7 +14,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.least_air.schedule import least_air
 
@@ -69,20 +68,21 @@ def _kept(options: Options, found: Found) -> Any:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    head = ["sensors", "air, l/min", "with least air", "saved, %", "settled error, mm", "with least air", "lost"]
-    rows = [["scenario", "controller", *information.COLUMNS, *head]]
+    pair = ("its own", "least air")
+    heads = [Head("air, l/min", pair), Head("saved, %", ("median", "5 %", "95 %"))]
+    heads += (Head("settled error, mm, its own", SPREAD), Head("settled error, mm, least air", SPREAD), Head("lost", pair))
+    rows: list[list[Cell | Head]] = [["scenario", "controller", *information.COLUMNS, "sensors", *heads]]
     for row in content["figures"]:
-        median, low, high = row["saved"]
         rows.append(
             [
                 row["scenario"],
                 f"`{row['controller']}`",
                 *information.informed(row["controller"], row["sensors"]),
                 row["sensors"],
-                *map(number, row["air"]),
-                f"{median:.1f} ({low:.1f} to {high:.1f})",
-                *(", ".join(map(number, one)) for one in row["error"]),
-                ", ".join(map(str, row["lost"])),
+                row["air"],
+                row["saved"],
+                *row["error"],
+                list(map(str, row["lost"])),
             ]
         )
     said = worlds(content["settings"]["seed"], content["settings"]["episodes"])

@@ -16,7 +16,7 @@ from agents.residual.settings import LAWS, is_one_of
 from agents.training.validation import validate
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash
-from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, number, quantile
+from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, quantile
 from baselines.named import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.files import finite
@@ -26,7 +26,7 @@ from birthsim_env.registry import names, register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import digits, markdown
 from lab.engine.worlds import worlds
 from lab.studies.haptics.multisine import words
 from lab.studies.haptics.rendering import rendering
@@ -256,7 +256,7 @@ def _entry(value: Any) -> str:
     if isinstance(value, list):
         middle, low, high = map(_entry, value)
         return f"{middle} ({low} to {high})"
-    return str(value or "") if value is None or isinstance(value, str) else number(value)
+    return str(value or "") if value is None or isinstance(value, str) else digits(value)
 
 
 STUDY = Study(

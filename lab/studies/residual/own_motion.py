@@ -15,7 +15,7 @@ from agents.policy.seeds import policy_folders
 from agents.training.configuration import TARGETS
 from agents.training.validation import validate
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
-from baselines.bench.statistics import crossed_interval, number, quantile
+from baselines.bench.statistics import crossed_interval, quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
@@ -23,7 +23,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import SPREAD_AND_WORST, Cell, Head, digits, markdown
 from lab.engine.worlds import worlds
 from lab.studies.honest.sensor_floor import motion_floor, static_only
 
@@ -119,20 +119,24 @@ def _mean(values: Array) -> float:
 
 def _shown(content: Content) -> dict[str, str]:
     settings, figures = content["settings"], content["figures"]
-    head = ["from its declared motion, mm", "less than the controller: mean, mm", "lost"]
-    rows = [["hand", "controller", *information.COLUMNS, *head]]
+    error, less = (
+        Head("from its declared motion, mm", SPREAD_AND_WORST),
+        Head("less than the controller, mm", ("mean", "95 % interval")),
+    )
+    rows: list[list[Cell | Head]] = [["hand", "controller", *information.COLUMNS, error, less, "lost"]]
     for row in figures["moving"]:
-        less = "" if row["less"] is None else "{} ({} to {})".format(*map(number, row["less"]))
-        error = " / ".join(map(number, row["error"]))
-        rows.append([row["hand"], row["who"], *_told(row["who"], settings), error, less, str(row["lost"])])
-    static = [["controller", *information.COLUMNS, "static stiffness error, %"]]
-    static += [[name, *_told(name, settings), " / ".join(map(number, sizes))] for name, sizes in figures["static"].items()]
+        mean, *ends = row["less"] or ("",)
+        saved = [mean, " to ".join(map(digits, ends))]
+        rows.append([row["hand"], row["who"], *_told(row["who"], settings), row["error"], saved, str(row["lost"])])
+    stiffness = Head("static stiffness error, %", SPREAD_AND_WORST)
+    static: list[list[Cell | Head]] = [["controller", *information.COLUMNS, stiffness]]
+    static += [[name, *_told(name, settings), sizes] for name, sizes in figures["static"].items()]
     said = (
         f"{worlds(settings['seed'], settings['episodes'])}, `{settings['sensors']}` sensors, randomised rigs, those "
         f"within the rig's strength. Differences compare the same worlds, with 95 % intervals. Below: `{STATIC}`."
     )
-    moving = markdown(rows, rows[0][5:6], alike=[(hand, who in BOUNDS) for hand, who, *_ in rows[1:]])
-    return {"own-motion.md": "\n\n".join([said, moving, markdown(static, static[0][4:])]) + "\n"}
+    moving = markdown(rows, (error,), alike=[(str(hand), who in BOUNDS) for hand, who, *_ in rows[1:]])
+    return {"own-motion.md": "\n\n".join([said, moving, markdown(static, (stiffness,))]) + "\n"}
 
 
 def _told(who: str, settings: dict[str, Any]) -> list[str]:

@@ -16,7 +16,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import cells, markdown
+from lab.engine.tables import SPREAD, Cell, Head, markdown
 from lab.engine.worlds import worlds
 from lab.studies.sensorless.measures import measure
 from lab.studies.sensorless.rigs import PLANTS, believed
@@ -36,9 +36,10 @@ LANES = 64
 """Worlds of a piece."""
 
 COLUMNS = {
-    "stiffness_error": "stiffness error, %", "hunting": "hunting, mm", "clamped_mm": "held by a clamp, mm", "clamped_N": "N",
+    "stiffness_error": "stiffness error, %", "hunting": "hunting, mm", "clamped_mm": "held by a clamp, mm",
+    "clamped_N": "held by a clamp, N",
     "noticed": "JND at 1 Hz", "overshoot": "overshoot after 190 and 241 N, mm",
-    "air": "air of a push, l/min", "clamped_air": "held, l/min", "turns": "valve turns, 1/s",
+    "air": "air of a push, l/min", "clamped_air": "air of a clamped head, l/min", "turns": "valve turns, 1/s",
 }  # fmt: skip
 
 
@@ -80,9 +81,10 @@ def tables(figures: Any, settings: dict[str, Any]) -> str:
         (COLUMNS, list(COLUMNS.values())),
         (studied_scenarios(), [f"{name}: settled error, mm" for name in studied_scenarios()]),
     ):
-        rows = [["force or acceleration sensor", "controller", *information.COLUMNS, *titles, "lost"]]
+        heads = [Head(title, SPREAD) for title in titles]
+        rows: list[list[Cell | Head]] = [["force or acceleration sensor", "controller", *information.COLUMNS, *heads, "lost"]]
         for row in figures:
-            shown = [cells(row["figures"][name][:2]) for name in names]
+            shown = [row["figures"][name][:2] for name in names]
             controller, file = RIGS[row["rig"]]
             facts = information.informed(controller, "honest", rig=TOLD.get(row["plant"], row["plant"]), parameters=file or "")
             rows.append([row["rig"], f"`{controller}`", *facts, *shown, f"{row['lost']} of {row['of']}"])
@@ -106,7 +108,7 @@ STUDY = Study(
         "stiffness_error": "%",
         "hunting": "mm",
         "clamped_mm": "mm",
-        "clamped_N": "N",
+        "clamped_N": "held by a clamp, N",
         "overshoot": "mm",
         **dict.fromkeys(studied_scenarios(), "mm"),
         "air": "l/min",

@@ -15,7 +15,7 @@ from birthsim_env.registry import register
 from lab.engine import information
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import digits, markdown
 from lab.studies.stability.swinging import stiffest
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
@@ -45,7 +45,7 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 def _entry(value: Any) -> str:
-    return "-" if value is None else f"{value:.4g}"
+    return "-" if value is None else digits(value)
 
 
 STUDY = Study({}, _tasks, _kept, UNITS, _shown)

@@ -9,7 +9,7 @@ from baselines.work.tasks import Task
 from birthsim_env.registry import register
 from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study
-from lab.engine.tables import markdown
+from lab.engine.tables import Cell, Head, digits, markdown
 from lab.studies.strangers.tasks import STRANGERS, stranger_tasks
 
 BELIEFS = ("owner", "identified")
@@ -32,7 +32,7 @@ def _shown(content: Content) -> dict[str, str]:
     )
     parts = [head, markdown(_identified(figures))]
     for one in settings["controller"]:
-        parts += [f"`{one}` with `honest` sensors: with the owner's belief, then identified", markdown(_driven(figures, one))]
+        parts += [f"`{one}` with `honest` sensors, as told by its owner and as identified:", markdown(_driven(figures, one))]
     return {"strangers.md": "\n\n".join(parts) + "\n"}
 
 
@@ -43,18 +43,19 @@ def _identified(figures: dict[str, Any]) -> list[list[str]]:
         mass = max(abs(one["mass"]) for one in found)
         friction = max(abs(error) for one in found for error in one["friction"])
         warned = f"{sum(one['warned'] for one in found)} of {len(found)}"
-        rows.append([name, warned, *(f"{value:.3g}" for value in misfits), f"{100 * mass:.2g}", f"{100 * friction:.2g}"])
+        rows.append([name, warned, *map(digits, misfits), digits(100 * mass), digits(100 * friction)])
     return rows
 
 
-def _driven(figures: dict[str, Any], controller: str) -> list[list[str]]:
-    rows = [["the rig has", "circle, mm", "stiffness error, %", "hunting under a push, mm", "lost"]]
+def _driven(figures: dict[str, Any], controller: str) -> list[list[Cell | Head]]:
+    quantities = ("circle, mm", "stiffness error, %", "hunting under a push, mm", "lost")
+    rows: list[list[Cell | Head]] = [["the rig has", *(Head(quantity, ("as told", "identified")) for quantity in quantities)]]
     for name, found in figures.items():
         cells = [[one["controllers"][controller][belief] for one in found] for belief in BELIEFS]
-        row = [name]
+        row: list[Cell | Head] = [name]
         for key, scale in (("error", 1e3), ("stiffness", 100.0), ("hunting", 1e3)):
-            row.append(", ".join(f"{scale * _worst(each, key):.3g}" for each in cells))
-        rows.append([*row, ", ".join(str(sum(one["lost"] for one in each)) for each in cells)])
+            row.append([scale * _worst(each, key) for each in cells])
+        rows.append([*row, [str(sum(one["lost"] for one in each)) for each in cells]])
     return rows
 
 

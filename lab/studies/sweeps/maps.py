@@ -68,7 +68,15 @@ def _panel(axes: Any, x: tuple[Array, list[str]], y: tuple[Array, list[str]], si
     if cells.size <= WRITTEN:
         for (i, j), value in np.ndenumerate(cells):
             dark = not np.isfinite(value) or norm(value) > 0.6
-            axes.text(j + 0.5, i + 0.5, number(value), ha="center", va="center", fontsize=7, color="white" if dark else "black")
+            axes.text(
+                j + 0.5,
+                i + 0.5,
+                number(value),
+                ha="center",
+                va="center",
+                fontsize=plt.rcParams["xtick.labelsize"],
+                color="white" if dark else "black",
+            )
     axes.set_xticks(np.arange(len(columns)) + 0.5, columns)
     axes.set_yticks(np.arange(len(rows)) + 0.5, rows)
     return drawn

@@ -111,8 +111,12 @@ def train_point(
     seed: int,
     episodes: int,
     place: str,
+    ending: Path | None,
 ) -> Result:
-    """Train a policy in the folder ``place``, where a killed training goes on, and evaluate it."""
+    """Train a policy in the folder ``place``, where a killed training goes on, and evaluate it.
+
+    Beside others it ends, with a checkpoint of the update that it is in, once there is a file ``ending``.
+    """
     from agents.policy.files import WEIGHTS
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
@@ -122,7 +126,7 @@ def train_point(
     several = {name: tuple(training[name]) for name in ("hidden", "beside")}
     settings = TrainingSettings(**{**training, **several})
     with own_folder(Path(place)) as folder:
-        train(settings, ResidualSettings(**residual), folder, parameters)
+        train(settings, ResidualSettings(**residual), folder, parameters, ending=ending)
     result = evaluate_point(
         controller="residual",
         source="",

@@ -9,7 +9,7 @@ import torch
 
 from agents import TrainingSettings, load_policy
 from agents.policy.seeds import best_policy
-from agents.training.lanes import Lanes
+from agents.training.by_gradients.lanes import Lanes
 from agents.training.validation import TRAINING_SEED
 from birthsim_live.rig.learning import worlds
 from birthsim_live.rig.pack import LEARNED

@@ -1,0 +1,1 @@
+"""Learning by gradients through the closed loop."""

@@ -1,0 +1,70 @@
+"""What is to beat: the records of the benchmark in a matrix, and the returns that controllers and policies reach."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from _generate.tables import table
+from birthsim.benchmark.suites import TASKS
+from birthsim_env.parts.scenarios import environment_id, find_scenario
+from birthsim_env.physics.rig.topology import RAIL
+from birthsim_env.registry import names
+from birthsim_env.scores import BEST, reference_scores
+from lab.studies.leaderboard.records import every_entry, openness, standings
+from lab.studies.leaderboard.who import title
+
+FILE = Path(__file__).resolve().parents[2] / "data" / "scores.csv"
+POLICY = "best learned policy"
+
+COLUMNS = {"`ideal`": "ideal", "`lab`": "lab", "`honest`": "honest", "`honest`, force not measured": "honest-no-force"}
+"""Heading -> how names of the benchmark's tasks end."""
+
+
+def what_to_beat() -> str:
+    """A row for each environment that has tasks, and a cell for each of four kinds of sensors."""
+    known, rows = every_entry(), []
+    for scenario in names("scenario"):
+        tasks = [f"{scenario}-{kind}" for kind in COLUMNS.values()]
+        if any(task in TASKS for task in tasks):
+            called = environment_id(scenario).removeprefix("BirthSIM/")
+            cells = [_cell(task, known) if task in TASKS else "" for task in tasks]
+            rows.append([f"[{called}](../environments/{page_of(scenario)}.md)", *cells])
+    return table(["environment", *COLUMNS], rows)
+
+
+def _cell(task: str, known: dict[str, Any]) -> str:
+    """How open a task is, its record, and that of learned entries where it is another."""
+    own = standings(task, known)
+    lines = [f"**{openness(own)}**"]
+    if own:
+        lines.append(f"{own[0].score:.0f}, {title(own[0].name, own[0].said)}")
+        learned = next((one for one in own if one.is_learned), None)
+        if learned is not own[0]:
+            lines.append(f"learned: {learned.score:.0f}, {learned.name}" if learned else "learned: none")
+    return "<br>".join(lines)
+
+
+def returns(scenario: str) -> str:
+    """What others are paid in an environment, on the scale of returns."""
+    rows = [[f"`{sensors}`", *_returns(scenario, sensors)] for sensors in ("ideal", "lab")]
+    return table(["sensors", "paper's controller", "best classical controller", "best policy that is shipped"], rows)
+
+
+def _returns(scenario: str, sensors: str) -> list[str]:
+    """On randomised rigs: of the paper's controller, and of the best ones with their names."""
+    name = environment_id(scenario)
+    with FILE.open(encoding="utf-8") as file:
+        rows = [(row["scenario"], row["sensors"], row["rig"], row["controller"], row["score"]) for row in csv.DictReader(file)]
+    plain = name.removeprefix("BirthSIM/").rpartition("-v")[0]
+    known = {who: score for *where, who, score in rows if where == [plain, sensors, "randomised"]}
+    roles = reference_scores(name, sensors)
+    cells = [known[roles["paper's law"]["controller"]]]
+    for role in (BEST, POLICY):
+        who = roles[role]["controller"] if role in roles else ""
+        cells.append(f"{known[who]}, `{who.partition(' ')[0]}`" if who else "none")
+    return cells
+
+
+def page_of(scenario: str) -> str:
+    """The page of docs/environments that shows a scenario."""
+    return "rail" if find_scenario(scenario).linkage == RAIL else scenario
