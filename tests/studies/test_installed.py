@@ -21,7 +21,7 @@ birthsim drive \\
 birthsim live
 ```
 
-    pip install birthsim
+    pip install numpy
 """
 
 

@@ -134,10 +134,10 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    longest = content["settings"]["longest"]
+    longest = content["settings"].get("longest", 0.0)  # a result of README alone has none
     rows = [["page", "command", "s", "outcome"]]
     for row, (seconds, status) in content["figures"]["rows"].items():
-        page, _, command = row.partition("\t")
+        page, _, command = row.rpartition("\t")
         ended = {0: "ok", INTERRUPTED: f"Ctrl-C after {longest:.0f} s, ended in order"}
         rows.append([page, f"`{command}`", f"{seconds:.0f}", ended.get(int(status), f"exit status {status:g}")])
     return {"installed.md": markdown(rows) + "\n"}
