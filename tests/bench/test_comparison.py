@@ -135,14 +135,14 @@ def test_the_overview_has_a_row_per_controller_and_says_lost(figures):
     assert head[0] == "controller"
     assert not any("lab" in title for title in head), "what did not run has no column"
     column = {title: k for k, title in enumerate(head)}
-    settled = column["circle: settled error, mm"]
-    assert law[0] == REFERENCE
-    assert law[settled].startswith("4 [")
-    assert other[settled].startswith("**2** [")
+    settled = column["settled error of circles, ideal sensors, mm: median [95 % interval]"]
+    assert law[0] == f"`{REFERENCE}`"
+    assert law[settled].startswith("4.00 [")
+    assert other[settled].startswith("**2.00** [")
     assert "lost]" in other[settled]
     assert worst[settled] == "lost [lost, lost]"
-    stiffness = column["rendered stiffness off by, % (median; worst)"]
-    assert (law[stiffness], other[stiffness], worst[stiffness]) == ("15; 20", "**1**; 1", "-")
+    off, most = (column[f"stiffness error, ideal sensors, %: {statistic}"] for statistic in ("median", "worst"))
+    assert [(row[off], row[most]) for row in (law, other, worst)] == [("15.0", "20.0"), ("**1.00**", "1.00"), ("-", "-")]
     assert [row[column["lost episodes"]] for row in (law, other, worst)] == ["0 of 6", "1 of 6", "3 of 3"]
 
 
@@ -153,8 +153,8 @@ def test_times_stand_apart_from_figures_since_they_differ_from_run_to_run(cells)
 
 def test_lost_episodes_are_counted_by_environment(figures):
     table = rows(losses(figures))
-    assert table[0] == ["lost episodes", CIRCLE.environment, PROBE.environment]
-    assert table[1:] == [[REFERENCE, "0 of 3", "0 of 3"], ["other", "1 of 3", "0 of 3"], ["worst", "3 of 3", "-"]]
+    assert table[0] == ["lost episodes", "Circle", "Probe"]
+    assert table[1:] == [[f"`{REFERENCE}`", "0 of 3", "0 of 3"], ["`other`", "1 of 3", "0 of 3"], ["`worst`", "3 of 3", "-"]]
 
 
 def test_pictures_show_medians_with_intervals_and_name_what_is_lost(figures, drawn, tmp_path):
@@ -167,9 +167,10 @@ def test_pictures_show_medians_with_intervals_and_name_what_is_lost(figures, dra
     medians = sorted(float(line.get_xdata()[0]) for line in circle.lines if len(line.get_xdata()) == 1)
     assert medians == [2.0, 2.0, 4.0, 4.0]
     assert circle.get_xlim()[1] < 20, "a lost episode does not stretch the axis"
-    assert [axes.get_title("left").replace("\n", " ") for axes in air.axes] == [
-        *(f"{kind} sensors; not shown, for they lose episodes: worst" for kind in ("ideal", "lab"))
-    ]
-    labels = [text.get_text() for text in air.legends[0].get_texts()]
-    assert labels == [REFERENCE, "other"]
-    assert [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in air.axes[0].lines] == [(4.0, 20.0), (2.0, 5.0)]
+    errors, used = air.axes
+    assert [label.get_text() for label in errors.get_yticklabels()] == ["other", REFERENCE, "worst"]
+    assert [text.get_text() for text in air.legends[0].get_texts()] == ["ideal sensors", "lab sensors"]
+    for axes, middles in ((errors, [2.0, 2.0, 4.0, 4.0]), (used, [5.0, 5.0, 20.0, 20.0])):
+        marks = [(float(line.get_ydata()[0]), float(line.get_xdata()[0])) for line in axes.lines if len(line.get_xdata()) == 1]
+        assert [middle for _, middle in sorted(marks)] == middles
+        assert [text.get_text() for text in axes.texts] == ["lost", "lost"]

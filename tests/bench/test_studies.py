@@ -127,9 +127,10 @@ def test_pictures_show_medians_and_ranges_and_name_what_is_lost(drawn, tmp_path)
     }
     study_figures.draw_studies(figures, tmp_path)
     stiffness = drawn["rendered_stiffness"]
-    assert [t.get_text() for t in stiffness.legends[0].get_texts()] == ["good (1 of 6 lost)", "bad (6 of 6 lost)"]
-    np.testing.assert_allclose(stiffness.axes[0].lines[0].get_ydata(), [2.0, 4.0])
-    ranges = [line[:, 1] for line in stiffness.axes[0].collections[0].get_segments()]
+    assert [t.get_text() for t in stiffness.legends[0].get_texts()] == ["1000 N/m", "4000 N/m"]
+    assert [t.get_text() for t in stiffness.axes[0].get_yticklabels()] == ["good (1 of 6 lost)", "bad (6 of 6 lost)"]
+    np.testing.assert_allclose([line.get_xdata()[0] for line in stiffness.axes[0].lines[:2]], [2.0, 4.0])
+    ranges = [line[:, 0] for one in stiffness.axes[0].collections[:2] for line in one.get_segments()]
     np.testing.assert_allclose(ranges, [[1.0, 9.0], [3.0, 5.0]])
     labels = [t.get_text() for t in drawn["hunting"].axes[0].get_yticklabels()]
     assert labels == ["good", "bad (4 of 4 lost)"]

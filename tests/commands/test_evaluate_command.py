@@ -92,7 +92,7 @@ def test_the_comparison_compares_and_draws(tmp_path, monkeypatch, capsys):
     assert lost["metrics"]["stiffness_error"]["median"] == lost["ratios"]["air"]["low"] == math.inf
     text = (out / "comparison.md").read_text()
     assert text.strip() in printed
-    assert f"| {slam} | default | no | yes | lost; lost |" in text
+    assert f"| `{slam}` | default | no | yes | lost | lost |" in text
     for name in ("settled_error", "air_against_error"):
         assert_picture(out, name)
         assert f"{name}.png" in printed
@@ -127,7 +127,7 @@ def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_pa
     arguments = (*world, "--jobs", 1, "--controller", fails, "backstepping")
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
-    assert "| backstepping |" in printed
+    assert "| `backstepping` |" in printed
     assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
     assert 'BirthSIM/Probe-v3,honest,"figures randomised, nominal",' in (tmp_path / "out/comparison.csv").read_text()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 
 from baselines.figures.style import DARK, MIDDLE, PAGE, STYLE, headline, label_of, legend_below, log_ticks, save
 from lab.studies.comparison.grid import known
@@ -55,15 +56,7 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
                 if key == first[0]:
                     least[environment] = min(least.get(environment, (np.inf, "")), (found["median"], cell["controller"]))
             elif np.isinf(found["median"]):
-                axes.text(
-                    high / 1.05,
-                    row,
-                    "lost",
-                    ha="right",
-                    va="center",
-                    fontsize=plt.rcParams["xtick.labelsize"],
-                    color=style["color"],
-                )
+                _say_lost(axes, high / 1.05, row, style["color"])
         axes.set(xscale="log", xlim=(low, high), title=re.sub(r"^BirthSIM/|-v\d+$", "", environment))
         axes.set_xlabel("error (mm)")
         log_ticks(axes.xaxis, 1.0)
@@ -81,6 +74,11 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
         )
     legend_below(figure, said="RMS settled error: medians with 95 % intervals")
     return save(figure, folder, "settled_error")
+
+
+def _say_lost(axes: Axes, place: float, row: float, color: str) -> None:
+    """In place of a median that is infinite."""
+    axes.text(place, row, "lost", ha="right", va="center", fontsize=plt.rcParams["xtick.labelsize"], color=color)
 
 
 def _limits(figures: Figures, metric: str) -> tuple[float, float]:
@@ -111,6 +109,8 @@ def air_figure(figures: Figures, folder: Path) -> list[Path]:
             if np.isfinite(found["median"]):
                 axes.hlines(row, found["low"], min(found["high"], top), color=style["color"], lw=0.9)
                 axes.plot(found["median"], row, ls="", ms=3.5, **style, label=f"{cell['sensors']} sensors")
+            elif np.isinf(found["median"]):
+                _say_lost(axes, top / 1.05, row, style["color"])
         axes.grid(axis="y", visible=False)
         for row in range(1, len(names)):
             axes.axhline(row - 0.5, color="black", alpha=0.15, lw=0.6)

@@ -152,4 +152,4 @@ STUDY = Study(
     timed=True,
     words={"extras": "of the installation", "longest": "after which comes Ctrl-C, in s"},
 )
-register(study="installed", about="every command of README and the site, from the wheel alone in an empty home")(STUDY)
+register(study="installed", about="every command of README and site, from the wheel alone")(STUDY)

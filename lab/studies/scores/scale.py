@@ -132,4 +132,4 @@ STUDY = Study(
     words={"choosing": "Worlds that choose the best controller", "episodes": "Worlds that measure it"},
     further=_further,
 )
-register(study="scale", about="errors of shut valves and of the best controller, the ends of the benchmark's scale")(STUDY)
+register(study="scale", about="the ends of the benchmark's scale: shut valves, best")(STUDY)
