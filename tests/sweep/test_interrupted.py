@@ -9,6 +9,7 @@ import pytest
 from agents.policy.sealed import unsealed
 from agents.training.checkpoint import FORMAT, NAME, _nested
 from agents.training.watch import PERIOD
+from birthsim_env.partials import HIDDEN
 from tests.console import PATIENCE
 from tests.kills.running import Running
 
@@ -41,7 +42,7 @@ def test_nothing_that_was_learned_is_lost(tmp_path):
     with Running(["sweep", str(tmp_path / "sweep.toml"), "--jobs", "2", "--out", str(out)], tmp_path) as running:
         until = time.monotonic() + PATIENCE
         # One that is being written lies in a folder of its own until it is complete.
-        while len(found := [path for path in out.rglob(NAME) if ".birthsim" not in path.parts]) < 2:
+        while len(found := [path for path in out.rglob(NAME) if HIDDEN not in path.parts]) < 2:
             assert time.monotonic() < until
             assert not running.ended(), running.stderr()[-2000:]
             time.sleep(0.05)
