@@ -282,9 +282,8 @@ def begun(one: Candidate, windows: Windows, noise: Noise, tick: Tick = lambda: N
     problem = Problem(windows, noise, shown[1], (), tick)
     offsets = problem.offsets
     with problem.explained():
-        for _ in range(2):  # offsets that a window with a wrong start led astray hide the right one
-            problem.begin_anew(shown[1], offsets.sizes)
-            free, residual = problem.settled(np.empty(0))
+        problem.begin_anew(shown[1], offsets.sizes)
+        free, residual = problem.settled(np.empty(0))
         if not np.isfinite(residual).all():
             raise ValueError(f"parameters = {one.name}: {problem.disagreement()}")
         offsets.bound(KNOWN)

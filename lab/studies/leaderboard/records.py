@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from birthsim.benchmark.row import SHOWN, said
-from birthsim.benchmark.suites import SUITES, TASKS
+from birthsim.benchmark.row import SHOWN, overall, said
+from birthsim.benchmark.suites import SUITES, TASKS, BenchmarkTask
 from lab.engine.tables import markdown
 from lab.studies.leaderboard.entries import entries, entry
 from lab.studies.leaderboard.who import is_learned, title
+
+Known = dict[str, dict[str, Any]]
+"""Name -> entry."""
 
 SOLVED = 95.0
 """% of feasible worlds: a task counts as solved where the record's success is at least this."""
@@ -47,12 +50,12 @@ class Standing:
         return said(self.row[metric], *SHOWN[metric])
 
 
-def every_entry() -> dict[str, dict[str, Any]]:
+def every_entry() -> Known:
     """Name -> entry."""
     return {path.stem: entry(path) for path in entries()}
 
 
-def standings(task: str, known: dict[str, dict[str, Any]]) -> list[Standing]:
+def standings(task: str, known: Known) -> list[Standing]:
     """Entries in a task, the best first."""
     found = [
         Standing(name, said, row)
@@ -63,6 +66,47 @@ def standings(task: str, known: dict[str, dict[str, Any]]) -> list[Standing]:
     return sorted(found, key=lambda one: (-one.score, one.name))
 
 
+@dataclass(frozen=True)
+class Whole:
+    """An entry over several tasks.
+
+    Parameters
+    ----------
+    name : str
+        Of the entry.
+    said : dict
+        The entry.
+    score : float
+        Interquartile mean over runs and tasks.
+    shown : str
+        The score with its 95 % interval.
+    over : str
+        What the interval is over, runs or episodes.
+    success : float
+        Mean over the tasks, from 0 to 1.
+    """
+
+    name: str
+    said: dict[str, Any]
+    score: float
+    shown: str
+    over: str
+    success: float
+
+
+def over_all(tasks: Sequence[BenchmarkTask], known: Known) -> list[Whole]:
+    """Entries that have every one of some tasks, the best first."""
+    found = []
+    for name, told in known.items():
+        rows = {row["task"]: row for row in told["tasks"]}
+        own = [rows[task.name] for task in tasks if task.name in rows]
+        if len(own) == len(tasks) and (whole := overall(own)):
+            shown = f"{whole['iqm']:.1f} [{whole['low']:.1f}, {whole['high']:.1f}]"
+            success = sum(row["success"]["value"] for row in own) / len(own)
+            found.append(Whole(name, told, whole["iqm"], shown, whole["over"], success))
+    return sorted(found, key=lambda one: (-one.score, one.name))
+
+
 def openness(own: Sequence[Standing]) -> str:
     """In a word how open a task is, from its standings."""
     if not own:
@@ -70,7 +114,7 @@ def openness(own: Sequence[Standing]) -> str:
     return "solved" if 100 * own[0].row["success"]["value"] >= SOLVED else "open"
 
 
-def records(suite: str, known: dict[str, dict[str, Any]]) -> str:
+def records(suite: str, known: Known) -> str:
     """A table of a suite: each task, who holds its record, and the best learned entry."""
     rows = [["task", "state", "record", "score", "success", "error, mm", "best learned", "its score"]]
     for task in SUITES[suite]:

@@ -2,9 +2,8 @@
 
 import csv
 import io
-from typing import Any
 
-from birthsim.benchmark.row import SHOWN, overall
+from birthsim.benchmark.row import SHOWN
 from birthsim.benchmark.suites import SUITES, TASKS
 from lab.engine import information
 from lab.engine.tables import markdown
@@ -12,11 +11,8 @@ from lab.engine.worlds import worlds
 from lab.studies.leaderboard import who
 from lab.studies.leaderboard.cards import cards
 from lab.studies.leaderboard.entries import RULES
-from lab.studies.leaderboard.records import every_entry, records, standings
+from lab.studies.leaderboard.records import Known, every_entry, over_all, records, standings
 from lab.studies.leaderboard.to_beat import to_beat
-
-Known = dict[str, dict[str, Any]]
-"""Name -> entry."""
 
 DATA = (
     "suite",
@@ -52,16 +48,11 @@ def texts() -> dict[str, str]:
 
 def _ranking(suite: str, known: Known) -> str:
     """Entries that have every task of a suite, the best first."""
-    found = []
-    for name, said in known.items():
-        rows = {row["task"]: row for row in said["tasks"]}
-        if all(task.name in rows for task in SUITES[suite]) and (whole := overall([rows[task.name] for task in SUITES[suite]])):
-            success = [rows[task.name]["success"]["value"] for task in SUITES[suite]]
-            score = f"{whole['iqm']:.1f} [{whole['low']:.1f}, {whole['high']:.1f}]"
-            cells = [who.title(name, said), score, whole["over"], f"{100 * sum(success) / len(success):.0f} %"]
-            found.append((-whole["iqm"], [*cells, *who.facts(said)[::2]]))
-    head = ["entry", "score of the suite", "interval over", "success, mean of tasks", "rig", "force sensed"]
-    return markdown([head, *(cells for _, cells in sorted(found))])
+    rows = [["entry", "score of the suite", "interval over", "success, mean of tasks", "rig", "force sensed"]]
+    for one in over_all(SUITES[suite], known):
+        cells = [who.title(one.name, one.said), one.shown, one.over, f"{100 * one.success:.0f} %"]
+        rows.append([*cells, *who.facts(one.said)[::2]])
+    return markdown(rows)
 
 
 def _entries(known: Known) -> str:

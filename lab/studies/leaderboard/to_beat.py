@@ -1,17 +1,14 @@
 """The table of README and of the site's first page: what is good already, and what is to beat."""
 
 import re
-from typing import Any
 
-from birthsim.benchmark.row import overall
-from birthsim.benchmark.suites import TASKS, BenchmarkTask
+from birthsim.benchmark.suites import TASKS
 from birthsim_env.physics.compiled.sources import ROOT
 from lab.engine.tables import markdown
 from lab.studies.leaderboard import who
+from lab.studies.leaderboard.records import Known, over_all
 
 README = ROOT / "README.md"
-
-Known = dict[str, dict[str, Any]]
 
 PAPERS = "backstepping"
 """The entry of the paper's controller."""
@@ -29,13 +26,16 @@ KINDS = {
 
 def to_beat(known: Known) -> str:
     """For each kind of tasks the paper's controller, and the best entries that have all of them, learned and not."""
-    rows = [["tasks", "paper's controller", "best controller", "its score", "its success", "best learned", "its score"]]
+    rows = [["tasks", "paper's controller", "best classical", "its score", "its success", "best learned", "its score"]]
     for kind, words in KINDS.items():
         tasks = [task for task in TASKS.values() if task.name.partition("-")[2] == kind]
-        classical = _best({name: said for name, said in known.items() if not who.is_learned(said)}, tasks)
-        learned = _best({name: said for name, said in known.items() if who.is_learned(said)}, tasks)
-        papers = _best({name: said for name, said in known.items() if name == PAPERS}, tasks)
-        rows.append([f"{words} ({len(tasks)})", papers[1], *classical, *learned[:2]])
+        found = over_all(tasks, known)
+        papers = next((one.shown for one in found if one.name == PAPERS), "-")
+        classical = next((one for one in found if not who.is_learned(one.said)), None)
+        learned = next((one for one in found if who.is_learned(one.said)), None)
+        best = [f"`{classical.name}`", classical.shown, f"{100 * classical.success:.0f} %"] if classical else ["-"] * 3
+        taught = [f"`{learned.name}`", learned.shown] if learned else ["-"] * 2
+        rows.append([f"{words} ({len(tasks)})", papers, *best, *taught])
     return markdown(rows)
 
 
@@ -47,15 +47,3 @@ def in_readme(table: str) -> str:
 
 
 _TABLE = re.compile(r"^(?:\|[^\n]*\n)+", re.MULTILINE)
-
-
-def _best(known: Known, tasks: list[BenchmarkTask]) -> tuple[str, str, str]:
-    """Of the entries that have all of some tasks the best: its name, its score with an interval, its success."""
-    found = []
-    for name, said in known.items():
-        rows = {row["task"]: row for row in said["tasks"]}
-        if all(task.name in rows for task in tasks) and (whole := overall([rows[task.name] for task in tasks])):
-            success = sum(rows[task.name]["success"]["value"] for task in tasks) / len(tasks)
-            score = f"{whole['iqm']:.1f} [{whole['low']:.1f}, {whole['high']:.1f}]"
-            found.append((-whole["iqm"], f"`{name}`", score, f"{100 * success:.0f} %"))
-    return min(found)[1:] if found else ("-", "-", "-")
