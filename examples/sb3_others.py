@@ -18,12 +18,20 @@ from agents import SB3VecEnv
 
 LANES = 64
 ROLLOUTS = {
-    "n_steps": 64, "batch_size": 512, "n_epochs": 5, "policy_kwargs": {"net_arch": [64], "lstm_hidden_size": 32},
-}  # fmt: skip
+    "n_steps": 64,
+    "batch_size": 512,
+    "n_epochs": 5,
+    "policy_kwargs": {"net_arch": [64], "lstm_hidden_size": 32},
+}
 REMEMBERED = {
-    "train_freq": 1, "gradient_steps": 8, "batch_size": 256, "buffer_size": 300_000, "learning_starts": 20 * LANES,
-    "tau": 0.02, "policy_kwargs": {"net_arch": [64, 64]},
-}  # fmt: skip
+    "train_freq": 1,
+    "gradient_steps": 8,
+    "batch_size": 256,
+    "buffer_size": 300_000,
+    "learning_starts": 20 * LANES,
+    "tau": 0.02,
+    "policy_kwargs": {"net_arch": [64, 64]},
+}
 """A step of all lanes, then eight updates: one to eight policy steps. Each costs as much as hundreds of policy steps."""
 
 ALGORITHMS = {

@@ -30,9 +30,16 @@ PUSHED = 5.0
 """N: a weaker hand says nothing about the stiffness that it feels."""
 
 METRICS = (
-    "pooled_mm", "tail_mm", "median_mm", "max_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent", "infeasible",
+    "pooled_mm",
+    "tail_mm",
+    "median_mm",
+    "max_mm",
+    "stiffness_error_percent",
+    "hunting_mm",
+    "saturation_percent",
+    "infeasible",
     "lost",
-)  # fmt: skip
+)
 """What a validation says, of which the last two are counts."""
 
 Lanes = NDArray[np.float64]

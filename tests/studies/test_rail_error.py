@@ -31,10 +31,17 @@ def test_a_lost_episode_counts_as_the_worst():
     said = STUDY.show(content)["rail-error.md"].splitlines()
     cells = [cell for one in said if one.startswith("| `pid`") for cell in one.strip("| ").split(" | ")[4:]]
     assert cells == [
-        *(["2.00", "2.90"] * 2), "lost", "lost", *(["4.00"] * 4), "6.00", "lost",
+        *(["2.00", "2.90"] * 2),
+        "lost",
+        "lost",
+        *(["4.00"] * 4),
+        "6.00",
+        "lost",
         *(["0.100"] * 6),
-        "0", "0", "2",
-    ]  # fmt: skip
+        "0",
+        "0",
+        "2",
+    ]
 
 
 @pytest.mark.parametrize("controller", ["pid"])

@@ -70,9 +70,19 @@ def test_a_wide_table_becomes_several_that_all_say_whose_rows_they_are() -> None
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (9.999, "10.0"), (0.05678, "0.0568"), (-123.6, "-124"), (1.31e4, "13,100"), (8.93e-5, "<0.001"),
-     (-8.93e-5, ">-0.001"), (float("inf"), "lost"), (float("nan"), "-"), ("refused", "refused")],
-)  # fmt: skip
+    [
+        (0.0, "0"),
+        (9.999, "10.0"),
+        (0.05678, "0.0568"),
+        (-123.6, "-124"),
+        (1.31e4, "13,100"),
+        (8.93e-5, "<0.001"),
+        (-8.93e-5, ">-0.001"),
+        (float("inf"), "lost"),
+        (float("nan"), "-"),
+        ("refused", "refused"),
+    ],
+)
 def test_a_number_has_three_digits_and_no_exponent(value: float | str, text: str) -> None:
     assert digits(value) == text
 

@@ -255,8 +255,16 @@ def test_columns_of_others_and_a_pipe_are_no_news(tmp_path: Path) -> None:
 
 
 READERS = {
-    "csv.reader", "csv.DictReader", "loadtxt", "genfromtxt", "fromstring", "fromtxt", "ParquetFile", "loadmat", "read_csv",
-}  # fmt: skip
+    "csv.reader",
+    "csv.DictReader",
+    "loadtxt",
+    "genfromtxt",
+    "fromstring",
+    "fromtxt",
+    "ParquetFile",
+    "loadmat",
+    "read_csv",
+}
 
 
 def test_nothing_else_reads_tables() -> None:

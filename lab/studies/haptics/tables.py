@@ -54,11 +54,20 @@ def rendering_table(runs: Runs, parameters: str = "") -> str:
                 ]
             )
     own = [
-        Head(quantity, WORST) for quantity in (
-            "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
-            "energy given, J", "shortage, N s/m", "air, l/min", "saturated, %",
+        Head(quantity, WORST)
+        for quantity in (
+            "bandwidth, Hz",
+            "1 JND up to, Hz",
+            "22 % up to, Hz",
+            "JND at 1 Hz",
+            "own error, mm",
+            "error to (19), mm",
+            "energy given, J",
+            "shortage, N s/m",
+            "air, l/min",
+            "saturated, %",
         )
-    ]  # fmt: skip
+    ]
     columns: list[str | Head] = [*WHO, "N/m", *own, "lost"]
     return _table(f"### Impedance under {words(PEAK, runs[0]['seed'])}", columns, rows, own[3:], own[:3])
 
@@ -91,9 +100,16 @@ def release_table(runs: Runs, parameters: str = "") -> str:
                 ]
             )
     columns: list[str | Head] = [
-        *WHO, LEAST[0], Head("overshoot of the declared impedance, mm", WORST), LEAST[1],
-        Head("peak speed of the declared impedance, m/s", WORST), LEAST[2], "stored by the spring, J", LEAST[3], "lost",
-    ]  # fmt: skip
+        *WHO,
+        LEAST[0],
+        Head("overshoot of the declared impedance, mm", WORST),
+        LEAST[1],
+        Head("peak speed of the declared impedance, m/s", WORST),
+        LEAST[2],
+        "stored by the spring, J",
+        LEAST[3],
+        "lost",
+    ]
     return _table(f"### A pull of {PULL:g} N let go in 10 ms at {STIFFNESS:g} N/m", columns, rows, LEAST)
 
 
