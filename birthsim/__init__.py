@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from birthsim_env.physics.rig.parameters import Parameters as Parameters
     from birthsim_env.physics.rig.parameters import load_parameters as load_parameters
     from birthsim_env.registry import register as register
-    from birthsim_env.scores import normalized_score as normalized_score
-    from birthsim_env.scores import reference_scores as reference_scores
+    from birthsim_env.scores import normalized_return as normalized_return
+    from birthsim_env.scores import reference_returns as reference_returns
 
 _PLACES = {
     "Circle": "birthsim_env.parts.references",
@@ -90,9 +90,9 @@ _PLACES = {
     "make": "birthsim.envs",
     "make_controller": "baselines.named",
     "make_vec": "birthsim.envs",
-    "normalized_score": "birthsim_env.scores",
+    "normalized_return": "birthsim_env.scores",
     "policies": "birthsim.names",
-    "reference_scores": "birthsim_env.scores",
+    "reference_returns": "birthsim_env.scores",
     "register": "birthsim_env.registry",
     "score": "birthsim.benchmark.scoring",
     "train": "birthsim.training",

@@ -13,12 +13,12 @@ from birthsim_env.parts.references import Circle, FixedTarget, Path, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.scores import normalized_score, reference_scores
+from birthsim_env.scores import normalized_return, reference_returns
 
 __all__ = [
     "Circle", "FixedTarget", "ForceProfile", "LinearModel", "Measurement", "Parameters", "Path", "Plant", "Reference",
     "StiffnessSchedule", "Trajectory", "UserForce", "balanced_pressures", "linearize", "linearize_lanes",
-    "normalized_score", "reference_scores",
+    "normalized_return", "reference_returns",
 ]  # fmt: skip
 
 __version__ = "0.1.0"

@@ -1,4 +1,4 @@
-"""Reference scores: what an episode of an environment pays with shut valves, under the laws, and with a learned policy.
+"""Reference returns: what an episode of an environment pays with shut valves, with controllers, and with a learned policy.
 
 ``birthsim study scores`` measures them and writes the file that lies beside this module.
 """
@@ -21,15 +21,15 @@ from birthsim_env.registry import names
 FILE = Path(__file__).with_name("scores.json")
 
 SHUT, BEST = "shut valves", "best classical law"
-"""Scores of 0 and of 100."""
+"""Ends of the scale, 0 and 100."""
 
 ROLES = (SHUT, "random valves", "paper's law", BEST, "best learned policy")
 
 SENSORS = ("ideal", "lab")
-"""Sensor models that there are scores for."""
+"""Sensor models that there are returns for."""
 
 RIGS = {False: "nominal", True: "drawn"}
-"""The environments' argument ``randomize`` -> the name of its scores."""
+"""The environments' argument ``randomize`` -> the name of its returns."""
 
 
 @cache
@@ -39,7 +39,7 @@ def _scores() -> dict[str, Any]:
 
 
 def _scored() -> dict[str, Any]:
-    """Id -> scores, of the environments that have any."""
+    """Id -> returns, of the environments that have any."""
     scores = _scores()
     return {
         environment_id(scenario, kind): scores[name]
@@ -50,17 +50,17 @@ def _scored() -> dict[str, Any]:
 
 
 def is_scored(environment: str) -> bool:
-    """Whether there are scores of an environment; a scenario that studies do not measure has none."""
+    """Whether there are returns of an environment; a scenario that studies do not measure has none."""
     return environment in _scored()
 
 
-def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
+def reference_returns(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
     """What controllers reach in an environment, as it was measured.
 
     Parameters
     ----------
     environment : str
-        An id; one with a controller inside has the scores of the one without.
+        An id; one with a controller inside has the returns of the one without.
     sensors : str
         ``"ideal"`` or ``"lab"``.
     randomize : bool
@@ -76,7 +76,7 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     Raises
     ------
     ValueError
-        Names what has no scores.
+        Names what has no returns.
 
     Notes
     -----
@@ -85,7 +85,7 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     Examples
     --------
     >>> import birthsim
-    >>> known = birthsim.reference_scores("BirthSIM/Circle-v2")
+    >>> known = birthsim.reference_returns("BirthSIM/Circle-v2")
     >>> known["shut valves"]["return"] < known["best classical law"]["return"]
     True
     """
@@ -93,49 +93,51 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     if not isinstance(environment, str) or environment not in scored:
         allowed = ", ".join(name for name in scored if "Residual" not in name)
         raise ValueError(
-            f"environment = {environment!r} has no reference scores; allowed: {allowed}, and the same with Residual before -v"
+            f"environment = {environment!r} has no reference returns; allowed: {allowed}, and the same with Residual before -v"
         )
     one_of("sensors", sensors, SENSORS)
     one_of("randomize", randomize, tuple(RIGS))
     return scored[environment][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
 
 
-def normalized_score(
-    environment: str, score: ArrayLike, sensors: str = "ideal", randomize: bool = True
+def normalized_return(
+    environment: str, total: ArrayLike, sensors: str = "ideal", randomize: bool = True
 ) -> float | NDArray[np.float64]:
-    """An episode's return on a scale where shut valves have 0 and the best classical controller has 100.
+    """An episode's return on a linear scale where shut valves have 0 and the best classical controller has 100.
+
+    It says how far a training is. The benchmark's score (``birthsim.score``) is another, logarithmic in the settled error.
 
     Parameters
     ----------
     environment : str
         An id.
-    score : float or array-like
+    total : float or array-like
         Sum of the rewards of an episode, undiscounted, or an array of such sums.
     sensors, randomize
-        As of ``reference_scores``.
+        As of ``reference_returns``.
 
     Returns
     -------
     float or array
-        As ``score``.
+        As ``total``.
 
     Raises
     ------
     ValueError
-        Names what has no scores, and a score that is no number.
+        Names what has no returns, and a ``total`` that is no number.
 
     Examples
     --------
     >>> import birthsim
-    >>> best = birthsim.reference_scores("BirthSIM/Circle-v2")["best classical law"]["return"]
-    >>> birthsim.normalized_score("BirthSIM/Circle-v2", best)
+    >>> best = birthsim.reference_returns("BirthSIM/Circle-v2")["best classical law"]["return"]
+    >>> birthsim.normalized_return("BirthSIM/Circle-v2", best)
     100.0
     """
-    known = reference_scores(environment, sensors, randomize)
+    known = reference_returns(environment, sensors, randomize)
     try:
-        given = floats_of(score)
+        given = floats_of(total)
     except ValueError as error:
-        raise ValueError(f"score = {shown(score)}: {error}; allowed: a number or an array of numbers") from error
+        raise ValueError(f"total = {shown(total)}: {error}; allowed: a number or an array of numbers") from error
     nothing, best = known[SHUT]["return"], known[BEST]["return"]
     scaled = 100.0 * (given - nothing) / (best - nothing)
     return scaled if scaled.ndim else float(scaled)

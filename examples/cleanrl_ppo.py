@@ -64,8 +64,11 @@ for update in range(steps // (lanes * rollout)):
         loss = ((0.25 * miss - torch.minimum(ratio * better, ratio.clamp(0.8, 1.2) * better)) * one).mean()
         optimizer.zero_grad(), loss.backward(), nn.utils.clip_grad_norm_(parameters, 0.5), optimizer.step()
     if update % 10 == 9 and worlds.env.env.return_queue:
-        score = birthsim_env.normalized_score(environment, np.mean(worlds.env.env.return_queue))
+        paid = birthsim_env.normalized_return(environment, np.mean(worlds.env.env.return_queue))
         length = np.mean(worlds.env.env.length_queue)
-        print(f"{(update + 1) * lanes * rollout:9,} steps: episodes of {length:.0f} steps, score {score:.0f}", flush=True)
+        print(
+            f"{(update + 1) * lanes * rollout:9,} steps: episodes of {length:.0f} steps, normalised return {paid:.0f}",
+            flush=True,
+        )
 print("on the test split, without exploration:")
 print(birthsim.score(act, environment))

@@ -1,4 +1,4 @@
-"""How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, prints their scores.
+"""How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, prints their returns.
 
 python examples/from_scratch.py --out out/scratch          needs pip install -e '.[agents]'; a run of 1 million steps
                                                            takes minutes; what --out holds is kept
@@ -19,7 +19,7 @@ from birthsim_env.registry import names
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = {"Stable-Baselines3": "sb3_ppo.py", "CleanRL": "cleanrl_ppo.py"}
-LINE = re.compile(r"^\s*([\d,]+) steps: episodes of (\d+) steps, score (-?\d+)", re.MULTILINE)
+LINE = re.compile(r"^\s*([\d,]+) steps: episodes of (\d+) steps, normalised return (-?\d+)", re.MULTILINE)
 
 
 def run(job):
@@ -56,7 +56,7 @@ if __name__ == "__main__":
     ]
     with ThreadPoolExecutor(arguments.jobs) as pool:
         curves = list(tqdm(pool.map(run, jobs), total=len(jobs), unit=" trainings"))
-    print(f"{'environment':22}{'algorithm':20}{'seed':>5}{'steps of the first':>20}{'and last episodes':>19}{'score':>8}")
+    print(f"{'environment':22}{'algorithm':20}{'seed':>5}{'steps of the first':>20}{'and last episodes':>19}{'return':>8}")
     for (name, environment, seed, *_), curve in zip(jobs, curves, strict=True):
         print(f"{environment:22}{name:20}{seed:5}{curve[0, 1]:20.0f}{curve[-1, 1]:19.0f}{curve[-1, 2]:8.0f}")
     print(f"written to {arguments.out}/: the output of every training")

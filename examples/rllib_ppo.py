@@ -38,7 +38,7 @@ while done < steps:
     result = algorithm.train()["env_runners"]
     done = int(result["num_env_steps_sampled_lifetime"])
     if "episode_return_mean" in result:
-        score = birthsim_env.normalized_score(environment, result["episode_return_mean"])
-        print(f"{done:9,} steps: episodes of {result['episode_len_mean']:.0f} steps, score {score:.0f}", flush=True)
+        paid = birthsim_env.normalized_return(environment, result["episode_return_mean"])
+        print(f"{done:9,} steps: episodes of {result['episode_len_mean']:.0f} steps, normalised return {paid:.0f}", flush=True)
 algorithm.stop()
 ray.shutdown()

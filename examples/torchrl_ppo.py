@@ -57,9 +57,9 @@ for data in Collector(worlds, actor, frames_per_batch=batch, total_frames=steps)
     done += batch
     ended = data["next", "done"].squeeze(-1)
     if ended.any():
-        score = birthsim_env.normalized_score(environment, data["next", "episode_reward"][ended].mean().item())
+        paid = birthsim_env.normalized_return(environment, data["next", "episode_reward"][ended].mean().item())
         length = data["next", "step_count"][ended].float().mean()
-        print(f"{done:9,} steps: episodes of {length:.0f} steps, score {score:.0f}", flush=True)
+        print(f"{done:9,} steps: episodes of {length:.0f} steps, normalised return {paid:.0f}", flush=True)
 
 
 def act(observations):

@@ -12,7 +12,7 @@ from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import penalize_lost, quantile
 from baselines.named import make_controller, uses_force
-from birthsim_env import __version__, reference_scores
+from birthsim_env import __version__, reference_returns
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
@@ -54,7 +54,7 @@ def compared(folder: Path) -> list[Evaluation]:
     place = policy.environment.replace("Residual", "")
     beside = [policy.settings.law, "backstepping", *["admittance-sensorless"] * (not policy.settings.force_sensor)]
     if is_scored(place):
-        known = reference_scores(place, sensors if sensors in SENSORS else SENSORS[-1], bool(randomize))
+        known = reference_returns(place, sensors if sensors in SENSORS else SENSORS[-1], bool(randomize))
         beside.append(known[BEST]["controller"])
     controllers = {"this policy": make_controller("residual", rig, policy=str(folder))}
     controllers |= {name: make_controller(name, rig) for name in beside if name != NO_LAW}

@@ -20,7 +20,7 @@ from baselines.named import make_controller
 from birthsim.command_line.settings import EPISODES, WORLD, Configured, Env, Seed, whole
 from birthsim.command_line.worlds import check_environment, policy_of
 from birthsim.exports import Form
-from birthsim_env import __version__, normalized_score, reference_scores
+from birthsim_env import __version__, normalized_return, reference_returns
 from birthsim_env.files import make_folder, whole_folder, write_text
 from birthsim_env.ids import rig_for
 from birthsim_env.physics.compiled.lanes import Array
@@ -28,7 +28,7 @@ from birthsim_env.registry import register
 from birthsim_env.scores import is_scored
 
 PERIOD = 0.005
-"""s: an action is held so long. The controller `admittance` scores 87 to 100 with it, and 53 to 88 with 10 ms."""
+"""s: an action is held so long. The normalised return of `admittance` is 87 to 100 with it, and 53 to 88 with 10 ms."""
 
 NOISE = 0.2
 """Standard deviation of what is added to the expert's openings at the medium level; assumed."""
@@ -89,7 +89,7 @@ def main(settings: Settings) -> None:
         raise ValueError(f"--out {str(settings.out)!r} has {name} already; allowed: another folder")
     scores: dict[str, float] = {}
     if is_scored(settings.env):
-        known = reference_scores(settings.env)
+        known = reference_returns(settings.env)
         scores = {"ref_min_score": known["shut valves"]["return"], "ref_max_score": known["best classical law"]["return"]}
     episodes = list(recorded(settings.env, settings.level, range(settings.seed, settings.seed + settings.episodes)))
     check_room(episodes, out)
@@ -198,11 +198,11 @@ def card(settings: Settings, name: str, episodes: list[Recorded]) -> str:
     returns = np.array([one.rewards.sum() for one in episodes])
     row = worth = ""
     if is_scored(settings.env):
-        scores = np.asarray(normalized_score(settings.env, returns))
-        low, high = np.quantile(scores, [0.05, 0.95])
-        row = f"\n| score, mean; 5th and 95th percentile | {scores.mean():.1f}; {low:.1f}, {high:.1f} |"
+        paid = np.asarray(normalized_return(settings.env, returns))
+        low, high = np.quantile(paid, [0.05, 0.95])
+        row = f"\n| normalised return, mean; 5th and 95th percentile | {paid.mean():.1f}; {low:.1f}, {high:.1f} |"
         best = "that of the best controller at 1 kHz (`ref_max_score`)"
-        worth = f"A score of 0 is that of shut valves (`ref_min_score`), 100 {best}.\n"
+        worth = f"A normalised return of 0 is that of shut valves (`ref_min_score`), 100 {best}.\n"
     who = {"expert": "The controller `admittance`", "paper": "The paper's controller", "random": "Uniform actions"}
     medium = f"The controller `admittance`, with Gaussian noise of {NOISE:g} on its actions,"
     return f"""---

@@ -25,7 +25,7 @@ from lab.engine.study import Study
 
 DATA = ROOT / "docs" / "data"
 ELSEWHERE = {
-    "reference_scores.json": ROOT / "birthsim_env" / "scores.json",
+    "reference_returns.json": ROOT / "birthsim_env" / "scores.json",
     "scale.json": ROOT / "birthsim" / "benchmark" / "scale.json",
 }
 """Texts that do not stand in ``DATA``."""

@@ -13,7 +13,7 @@ from agents.policy.files import read_policy
 from agents.policy.seeds import policy_folders
 from agents.training.configuration import load_configuration
 from baselines import make_controller
-from birthsim_env import Parameters, Plant, linearize, normalized_score
+from birthsim_env import Parameters, Plant, linearize, normalized_return
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.physics.rig.values import length_of
 from birthsim_env.vector_env import BirthSIMVectorEnv
@@ -90,7 +90,7 @@ SEQUENCES = {
 }
 LONG = {
     "frequency": lambda given: linearize(None, (0.5, 0.0)).frequency_response(given),
-    "score": lambda given: normalized_score(CIRCLE, given),
+    "total": lambda given: normalized_return(CIRCLE, given),
 }
 
 

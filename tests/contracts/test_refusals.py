@@ -14,7 +14,7 @@ from baselines import AdmittanceController, BacksteppingController, evaluate, ma
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals.symbolic import symbolic_model
 from birthsim_build.code import ptx
-from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
+from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_return
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parts.hands.contractions import Contractions
@@ -45,7 +45,7 @@ gains = partial(make_controller, "admittance[learn=false]", RIG)
 evaluation = partial(evaluate, PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False)
 linear = partial(linearize, None, (0.5, 0.0))
 limits = partial(PortLimiter, named("shut-valves"), RIG)
-score = partial(normalized_score, environment=CIRCLE, score=1.0)
+paid = partial(normalized_return, environment=CIRCLE, total=1.0)
 training, residual = partial(override, TrainingSettings()), partial(override, ResidualSettings())
 
 
@@ -138,10 +138,10 @@ TABLE = [
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
     *((kind, "parameters", (42,), "None, a Parameters, a mapping or the path") for kind in (Plant, BacksteppingController)),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),
-    (score, "environment", ("BirthSIM/Square-v1", "BirthSIM/Circle-v0", "CartPole-v1", None), CIRCLE),
-    (score, "sensors", ("perfect",), "'ideal', 'lab'"),
-    (score, "randomize", ("plant",), "False, True"),
-    (score, "score", (None, "1", True), "a number or an array of numbers"),
+    (paid, "environment", ("BirthSIM/Square-v1", "BirthSIM/Circle-v0", "CartPole-v1", None), CIRCLE),
+    (paid, "sensors", ("perfect",), "'ideal', 'lab'"),
+    (paid, "randomize", ("plant",), "False, True"),
+    (paid, "total", (None, "1", True), "a number or an array of numbers"),
     (training, "step", (3,), "environment, algorithm, steps, "),
     (training, "algorithm", ("dqn",), "'ppo', 'recurrent-ppo', 'sac', 'tqc', 'apg'"),
     (training, "steps", (0, -5, 1e6 + 0.5), "a whole number >= 1 and <= "),

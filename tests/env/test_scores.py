@@ -13,7 +13,7 @@ from birthsim_env import Parameters, Reference
 from birthsim_env.loop.rows import World
 from birthsim_env.parts.scenarios import Scenario, environment_id, scored_scenarios, studied_scenarios
 from birthsim_env.reward import Tally, add
-from birthsim_env.scores import ROLES, is_scored, normalized_score, reference_scores
+from birthsim_env.scores import ROLES, is_scored, normalized_return, reference_returns
 from tests.covering import thinned
 from tests.registered import registered
 
@@ -56,7 +56,7 @@ def test_returns_order_controllers_as_their_errors_do(environment, sensors, epis
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 @pytest.mark.parametrize("randomize", [False, True])
 def test_every_id_and_condition_has_scores_in_order(environment, sensors, randomize):
-    known = reference_scores(environment, sensors, randomize)
+    known = reference_returns(environment, sensors, randomize)
     assert tuple(known) == (ROLES if environment in IDS else ROLES[:-1])  # no policy for a rail is shipped
     paid = {role: entry["return"] for role, entry in known.items()}
     assert paid["random valves"] < min(paid["shut valves"], paid["paper's law"])
@@ -65,10 +65,10 @@ def test_every_id_and_condition_has_scores_in_order(environment, sensors, random
         assert (paid["shut valves"] < paid["paper's law"]) == ((environment, randomize) != (PROBE, True))
     assert known["shut valves"]["error"] > known["paper's law"]["error"] > known["best classical law"]["error"]
     ends = [paid["shut valves"], paid["best classical law"], math.nan]
-    np.testing.assert_allclose(normalized_score(environment, ends, sensors, randomize), [0, 100, math.nan], atol=1e-9)
-    assert normalized_score(environment, ends[1], sensors, randomize) == pytest.approx(100)
+    np.testing.assert_allclose(normalized_return(environment, ends, sensors, randomize), [0, 100, math.nan], atol=1e-9)
+    assert normalized_return(environment, ends[1], sensors, randomize) == pytest.approx(100)
     residual = environment.replace("-v", "Residual-v")
-    assert reference_scores(residual, sensors, randomize) is known
+    assert reference_returns(residual, sensors, randomize) is known
 
 
 def test_an_environment_that_no_study_measured_says_so(monkeypatch):
@@ -78,8 +78,8 @@ def test_an_environment_that_no_study_measured_says_so(monkeypatch):
     registered(monkeypatch, Unmeasured, scenario="unmeasured")
     name = environment_id("unmeasured")
     assert not is_scored(name)
-    with pytest.raises(ValueError, match=f"environment = '{name}' has no reference scores; allowed: ") as caught:
-        reference_scores(name)
+    with pytest.raises(ValueError, match=f"environment = '{name}' has no reference returns; allowed: ") as caught:
+        reference_returns(name)
     assert [one for one in SCORED if one not in str(caught.value)] == []
 
 

@@ -9,7 +9,7 @@ from birthsim.benchmark.suites import TASKS
 from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.topology import RAIL
 from birthsim_env.registry import names
-from birthsim_env.scores import BEST, reference_scores
+from birthsim_env.scores import BEST, reference_returns
 from lab.studies.leaderboard.records import every_entry, openness, standings
 from lab.studies.leaderboard.who import title
 
@@ -57,7 +57,7 @@ def _returns(scenario: str, sensors: str) -> list[str]:
         rows = [(row["scenario"], row["sensors"], row["rig"], row["controller"], row["score"]) for row in csv.DictReader(file)]
     plain = name.removeprefix("BirthSIM/").rpartition("-v")[0]
     known = {who: score for *where, who, score in rows if where == [plain, sensors, "randomised"]}
-    roles = reference_scores(name, sensors)
+    roles = reference_returns(name, sensors)
     cells = [known[roles["paper's law"]["controller"]]]
     for role in (BEST, POLICY):
         who = roles[role]["controller"] if role in roles else ""

@@ -27,7 +27,9 @@ def example():
         command = [sys.executable, "-P", str(EXAMPLES / f"{name}.py"), "BirthSIM/Probe-v3", str(steps)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)
         assert done.returncode == 0, done.stderr[-3000:]
-        return [float(score) for score in re.findall(r"^\s*[\d,]+ steps: .* score (-?\d+)$", done.stdout, re.MULTILINE)]
+        return [
+            float(paid) for paid in re.findall(r"^\s*[\d,]+ steps: .* normalised return (-?\d+)$", done.stdout, re.MULTILINE)
+        ]
 
     return run
 

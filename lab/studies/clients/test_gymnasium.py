@@ -180,6 +180,6 @@ def test_an_environment_is_made_again_from_its_spec(actions, bare):
 
 
 def test_scores_come_with_the_wheel():
-    known = birthsim_env.reference_scores("BirthSIM/Circle-v2")
-    scores = [birthsim_env.normalized_score("BirthSIM/Circle-v2", one["return"]) for one in known.values()]
+    known = birthsim_env.reference_returns("BirthSIM/Circle-v2")
+    scores = [birthsim_env.normalized_return("BirthSIM/Circle-v2", one["return"]) for one in known.values()]
     assert [round(score) for score in (min(scores, key=abs), max(scores))] == [0, 100]

@@ -11,7 +11,7 @@ import minari
 import numpy as np
 import pytest
 
-from birthsim_env import normalized_score
+from birthsim_env import normalized_return
 
 NAME = "birthsim/circle/expert-v0"
 
@@ -54,7 +54,7 @@ def test_a_killed_export_leaves_no_dataset_and_the_same_command_then_writes_it(t
 def test_its_scores_are_the_projects(dataset):
     returns = np.array([episode.rewards.sum() for episode in dataset.iterate_episodes()])
     np.testing.assert_allclose(
-        100 * minari.get_normalized_score(dataset, returns), normalized_score("BirthSIM/Circle-v2", returns)
+        100 * minari.get_normalized_return(dataset, returns), normalized_return("BirthSIM/Circle-v2", returns)
     )
     assert returns.mean() > 1200
 

@@ -23,7 +23,7 @@ from lab.engine.study import Found, Options, Study
 from lab.studies.comparison.grid import default_controllers
 from lab.studies.scores.tables import Scored, data, informed, overview
 
-REFERENCE = "reference_scores.json"
+REFERENCE = "reference_returns.json"
 """What stands in ``birthsim_env/scores.json``."""
 
 Rows = dict[str, dict[str, Any]]
