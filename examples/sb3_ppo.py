@@ -1,4 +1,4 @@
-"""PPO of Stable-Baselines3 drives the valves, in 64 lanes; then its score on the test split, and that of the paper's controller.
+"""PPO of Stable-Baselines3 drives the valves, in 64 lanes; then its score on the test split, beside a controller's.
 
 python examples/sb3_ppo.py [id] [steps] [seed] [file]      needs pip install -e '.[agents]'; 3 CPU minutes
 """
