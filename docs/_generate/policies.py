@@ -127,7 +127,7 @@ def _scores(name: str, settings: dict[str, Any], sensors: str) -> list[int]:
     plain = environment_id(_scenario(settings["environment"])).removeprefix("BirthSIM/").rpartition("-v")[0]
     with FILE.open(encoding="utf-8") as file:
         return [
-            int(row["score"])
+            int(row["normalised return"])
             for row in csv.DictReader(file)
             if (row["scenario"], row["sensors"], row["rig"]) == (plain, sensors, "randomised")
             and row["controller"].startswith(f"{name} seed")

@@ -23,7 +23,7 @@ def test_the_overview_names_the_best_and_says_where_there_is_none():
 
 def test_the_data_file_has_every_controller_with_its_returns():
     table = list(csv.DictReader(data(FOUND).splitlines()))
-    assert [(one["controller"], one["score"], one["error, mm"]) for one in table] == [
+    assert [(one["controller"], one["normalised return"], one["error, mm"]) for one in table] == [
         ("random", "-25", "lost"),
         ("shut", "0", "40"),
         ("law", "50", "2"),

@@ -1,4 +1,4 @@
-"""The scores as Markdown, an overview with one row per environment and condition, and as CSV, with every controller."""
+"""The returns as Markdown, an overview with one row per environment and condition, and as CSV, with every controller."""
 
 import csv
 import io
@@ -14,7 +14,7 @@ from lab.engine import information
 from lab.engine.tables import markdown
 
 DATA = (
-    *("scenario", "sensors", "rig", "controller", "score", "error, mm", "success, %", "lost, %"),
+    *("scenario", "sensors", "rig", "controller", "normalised return", "error, mm", "success, %", "lost, %"),
     *(f"return at {discount:g}" for discount in DISCOUNTS),
 )
 """Columns of the data file: who, where; settled error, median over episodes; mean return of an episode per discount."""
@@ -35,7 +35,7 @@ class Scored:
         """The kind of rig as tables call it."""
         return self.rig.replace("drawn", "randomised")
 
-    def score(self, controller: str) -> int:
+    def normalised(self, controller: str) -> int:
         """0 for shut valves, 100 for the best controller."""
         low, high = (float(self.roles[role]["return"]) for role in (SHUT, BEST))
         return round(100 * (float(self.rows[controller]["returns"]["1.0"]) - low) / (high - low))
@@ -53,7 +53,7 @@ def overview(found: Sequence[Scored]) -> str:
                 row.append("-")
                 continue
             name = one.roles[role]["controller"]
-            row.append(f"{one.score(name)}, {name}" if role.startswith("best") else str(one.score(name)))
+            row.append(f"{one.normalised(name)}, {name}" if role.startswith("best") else str(one.normalised(name)))
         rows.append(row)
     return markdown(rows)
 
@@ -80,7 +80,7 @@ def data(found: Sequence[Scored]) -> str:
             error = "lost" if row["error"] is None else number(row["error"])
             paid = [f"{row['returns'][str(discount)]:.4g}" for discount in DISCOUNTS]
             share = [f"{100 * row[key]:.0f}" for key in ("success", "lost")]
-            table.append([one.scenario, one.sensors, one.shown_rig, name, one.score(name), error, *share, *paid])
+            table.append([one.scenario, one.sensors, one.shown_rig, name, one.normalised(name), error, *share, *paid])
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(table)
     return text.getvalue()
