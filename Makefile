@@ -158,12 +158,10 @@ kills: $(READY)
 	KILLS=$${KILLS:-12} nice $(PYTEST) tests/kills
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_drive birthsim_live lab tests .ci
-	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_drive birthsim_live lab tests .ci
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
-	$(BIN)/ruff check docs/conf.py docs/_generate
-	$(BIN)/ruff format --check docs/conf.py docs/_generate
 
 # What comes from npm: axe-core, with which tests look at pages, and MathJax, which draws the site's equations.
 npm: $(NPM)/.ready

@@ -54,7 +54,8 @@ def _returns(scenario: str, sensors: str) -> list[str]:
     """On randomised rigs: of the paper's controller, and of the best ones with their names."""
     name = environment_id(scenario)
     with FILE.open(encoding="utf-8") as file:
-        rows = [(row["scenario"], row["sensors"], row["rig"], row["controller"], row["normalised return"]) for row in csv.DictReader(file)]
+        columns = ("scenario", "sensors", "rig", "controller", "normalised return")
+        rows = [[row[column] for column in columns] for row in csv.DictReader(file)]
     plain = name.removeprefix("BirthSIM/").rpartition("-v")[0]
     known = {who: score for *where, who, score in rows if where == [plain, sensors, "randomised"]}
     roles = reference_returns(name, sensors)
