@@ -22,27 +22,27 @@ class Settings(Processes):
     """
 
     policy: Annotated[list[str], MANY, Parameter(metavar="POLICY...")] = field(kw_only=False)
-    """What is judged."""
+    """The policy to be judged, in one of the forms above."""
     suite: Annotated[Literal["classic", "open", "all"] | None, Parameter(group=WORLD)] = None
     """Every task of a suite, or of all, instead of one environment."""
     tasks: Annotated[list[str] | None, MANY, Parameter(group=WORLD, metavar="TASK...")] = None
-    """Tasks of the suites by their names, instead of a whole suite."""
+    """Tasks of the suites by their names, instead of a whole suite; write POLICY before this option."""
     env: Annotated[str | None, Parameter(group=WORLD, metavar="ID", help="Environment, else BirthSIM/Circle-v2.")] = None
     sensors: Sensors = "ideal"
     no_force_sensor: Annotated[bool, Parameter(group=WORLD)] = False
     """The hand's force is not measured."""
     episodes: Annotated[int, whole(1, EPISODES)] = 64
-    """Worlds of each task."""
+    """Number of worlds of each task."""
     seed: WorldSeed | None = None
-    """Seed of the first world, or a split where it begins, else test."""
+    """Seed of the first world, or a split, whose first seed it is. [default: test]"""
     policy_period: Annotated[float, number("s", above=0.0, most=1.0)] = 0.01
-    """Between two actions of an archive, an ONNX file or a function."""
+    """Time between two actions of an archive, an ONNX file or a function."""
     normalize: Annotated[str | None, Parameter(metavar="FILE")] = None
-    """What VecNormalize.save wrote, for an archive."""
+    """For an archive: the file that VecNormalize.save wrote."""
     name: Annotated[str | None, Parameter(metavar="NAME")] = None
-    """What the row calls the entry, else the name of the policy."""
+    """Name of the entry in its row. [default: the name of the policy]"""
     out: Path
-    """Folder for score.json and what is complete."""
+    """Folder for score.json and results so far."""
 
 
 def main(settings: Settings) -> None:
