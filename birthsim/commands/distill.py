@@ -33,8 +33,8 @@ TAUGHT = {"environment": str, "sensors": str, "randomize": (bool, str), "validat
 class Settings(Configured):
     """Train recurrent policies, the students: from measurements alone they imitate teachers that know the true rig.
 
-    A folder gets the best student so far after every round. Interrupted, the same command goes on with the seeds that are not
-    done.
+    After every round the folder gets the best student so far. After an interruption the same command continues with the seeds
+    that are not complete.
     """
 
     teacher: Annotated[Path, Parameter(metavar="DIR")]

@@ -26,9 +26,9 @@ from birthsim.command_line.settings import (
 class Settings(Parts, Processes):
     """Evaluate controllers, each on the same seeds and therefore in the same worlds.
 
-    Without --controller and --policy it is backstepping. With --policy the trained residual runs beside the controllers named,
-    or else beside the paper's and the one that it corrects. What the output folder holds of the same settings, rig and code is
-    kept, so that an interrupted run goes on.
+    Without --controller and --policy the controller is backstepping. With --policy the trained residual is evaluated together
+    with the named controllers, or else with the paper's and the one that it corrects. Results that the output folder has of the
+    same settings, rig and code are kept, so that an interrupted run continues.
     """
 
     env: Env = "BirthSIM/Circle-v2"
