@@ -22,7 +22,7 @@ class Command(NamedTuple):
 
 GROUPS: dict[str, dict[str, Command]] = {
     "see": {
-        "run": Command("one episode: its figures printed, its motion drawn", "--env BirthSIM/Probe-v3 --out out/run"),
+        "run": Command("one episode: its errors printed, its motion drawn", "--env BirthSIM/Probe-v3 --out out/run"),
         "live": Command("the rig in the browser; --replay plays a recording", "--compare admittance"),
         "figure4": Command("the experiment of the paper's Fig. 4", "--out out/figure4"),
         "animate": Command("two controllers beside each other, moving", "--seed 1 --out out/forceps.webp"),
@@ -33,9 +33,9 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "score": Command("a policy of any library on the benchmark", "residual:circle --out out/score"),
         "tune": Command("a search for a controller's gains", "--controller pid --trials 75 --out out/tune"),
-        "identify": Command("a laboratory's own rig, from its log", "log.csv --out rig.toml"),
-        "compare": Command("a log beside rigs: where each model leaves it", "log.csv --parameters rig.toml"),
-        "study": Command("studies of the project, in a clone", "speed"),
+        "identify": Command("parameters of your own rig, from its log", "log.csv --out rig.toml"),
+        "compare": Command("a log beside models of its rig: where each departs", "log.csv --parameters rig.toml"),
+        "study": Command("the project's own measurements, in a clone", "speed"),
     },
     "learn": {
         "train": Command("policies by PPO, SAC and others, or by gradients", "--config circle --seeds 5 --out out/circle"),
@@ -44,11 +44,11 @@ GROUPS: dict[str, dict[str, Command]] = {
     },
     "use elsewhere": {
         "drive": Command("a controller on a real rig, within limits", "--driver simulated --duration 3 --out out/drive"),
-        "export": Command("policies, loops and logs in other forms", "--to wasm --out out/wasm"),
+        "export": Command("policies, closed loops and logs in other formats", "--to wasm --out out/wasm"),
     },
     "this machine": {
-        "doctor": Command("what works here, and what to install", ""),
-        "warmup": Command("compile ahead what commands need first", ""),
+        "doctor": Command("what works here, and what to install for the rest", ""),
+        "warmup": Command("compile in advance what is not prebuilt", ""),
     },
 }
 """Group -> command, the name of its module -> what it is. It is documented in docs/reference/commands."""
@@ -95,10 +95,10 @@ def overview() -> str:
     lines = [
         "usage: birthsim COMMAND ...",
         "",
-        "BirthSIM, a pneumatic haptic interface: rig, controllers, measures.",
+        "BirthSIM, a simulator and benchmark of a pneumatic haptic interface.",
     ]
     for title, group in GROUPS.items():
         lines += ["", f"{title}:", *(f"  {name:9} {command.does}" for name, command in group.items())]
     return "\n".join(
-        [*lines, "", "birthsim COMMAND --help has a command's options.", f"example: birthsim run {COMMANDS['run'].example}"]
+        [*lines, "", "birthsim COMMAND --help lists a command's options.", f"example: birthsim run {COMMANDS['run'].example}"]
     )

@@ -108,23 +108,25 @@ WorldSeed = Annotated[int, Parameter(converter=read_world_seed, metavar="SEED")]
 
 SENSORS = Parameter(group=WORLD, metavar="NAME", validator=named("sensors"))
 ALGORITHM = Parameter(metavar="NAME", validator=named("algorithm"))
-Sensors = Annotated[str, SENSORS, Parameter(help="Sensor model, one of those below.")]
+Sensors = Annotated[str, SENSORS, Parameter(help="Sensor model, one of the sensors listed below.")]
 FRICTION = Parameter(group=WORLD, metavar="NAME", validator=named("friction"))
 Friction = Annotated[
-    str, FRICTION, Parameter(help="What the friction of rigs is drawn from, one of those below, else the rig's.")
+    str,
+    FRICTION,
+    Parameter(help="What the friction of rigs is drawn from, one of the frictions listed below. [default: the rig's]"),
 ]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
-RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
+RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig. [default: the paper's rig]")]
 Style = Annotated[
     Literal["screen", "paper"],
-    Parameter(help="For a screen, as PNG and SVG; or for a paper: a column wide, without titles, letters of 8 pt, as PDF."),
+    Parameter(help="Figures for a screen (PNG and SVG) or for a paper (PDF: a column wide, letters of 8 pt, no titles)."),
 ]
 MANY = Parameter(consume_multiple=True)
 """An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
 HAND = Parameter(group=WORLD, metavar="PART")
 TABLE = Parameter(metavar="TABLE")
-NAMES = "the controllers below, with options as in 'admittance[learn=false]', or path/to/file.py:Class."
+NAMES = "the controllers listed below, with options as in 'admittance[learn=false]', or path/to/file.py:Class."
 """Help of an option that names controllers."""
 Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]
 Controllers = Annotated[
@@ -139,7 +141,7 @@ Set = Annotated[
     Parameter(
         group=CONTROL,
         metavar="GAIN=VALUE...",
-        help="Gains and other options of every controller named that has them, such as bandwidth=60; for one of them alone "
+        help="Gains and other options, such as bandwidth=60, for every named controller that has them; for only one of them "
         "write 'pid[bandwidth=60]' as its name.",
     ),
 ]
@@ -153,7 +155,7 @@ class Configured:
     """What every command with options has."""
 
     config: Annotated[Path | None, Parameter(metavar="FILE")] = None
-    """TOML file of these options, a line "name = value" each; the command line overrides it."""
+    """TOML file with these options, one "name = value" per line; the command line takes precedence."""
 
     def shown(self) -> dict[str, Any]:
         """What results depend on, as JSON."""
@@ -169,9 +171,9 @@ class Logged(Configured):
     """How a laboratory's log is read."""
 
     columns: Annotated[str | None, Parameter(metavar="NAME=COLUMN,...")] = None
-    """What columns of the log are called, such as force_x=Fz,force_y=none; opening=u*0.2-1 of one in volts."""
+    """What the columns of the log are called, such as force_x=Fz,force_y=none, or opening=u*0.2-1 for a column in volts."""
     skip: Annotated[int | None, whole(0)] = None
-    """Lines of the log before its heading, where it is not found by itself."""
+    """Number of lines before the heading of the log, if it is not found automatically."""
     decimal_comma: bool = False
     """The log has decimal commas."""
 
@@ -191,17 +193,17 @@ class Parts(Configured):
         Parameter(
             group=WORLD,
             metavar="PART",
-            help="A CSV file of time, x, y (s, m, m), FILE:t,a,b where its heading calls them so, or path/to/file.py:Name of a "
-            "birthsim_env.Trajectory or of a function of time that returns (x, y).",
+            help="What the head follows: a CSV file of time, x, y (s, m, m), FILE:t,a,b if its columns have these names, or "
+            "path/to/file.py:Name of a birthsim_env.Trajectory or of a function of time that returns (x, y).",
         ),
     ] = None
     stiffness: Annotated[str | None, Parameter(group=WORLD, metavar="FILE")] = None
-    """CSV file of time, x, y, stiffness (s, m, m, N/m) of the setpoints; --reference takes the same file."""
+    """Stiffness setpoints: a CSV file of time, x, y, stiffness (s, m, m, N/m), which --reference takes too."""
     user_force: Annotated[
         str | None,
         HAND,
         Parameter(
-            help="The hand: one of those below, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
+            help="The hand: one of the hands listed below, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
             "birthsim_env.UserForce or of a function of time that returns (Fx, Fy).",
         ),
     ] = None
@@ -217,6 +219,6 @@ class Processes(Configured):
     """Where work is done."""
 
     jobs: Annotated[int, whole(1, JOBS_AT_MOST), Parameter(group=PROCESSES)] = JOBS
-    """Processes side by side."""
+    """Number of processes that work in parallel."""
     cluster: Annotated[str | None, Parameter(group=PROCESSES, metavar="ray[:ADDRESS]", validator=check_cluster)] = None
-    """Ray's workers instead, of a running cluster or of this machine."""
+    """Use the workers of Ray instead, of a running cluster or of this machine."""

@@ -49,18 +49,18 @@ class Settings(Parts):
         "backstepping",
         "admittance-backstepping",
     )
-    """Two names or path/to/file.py:Class; residual is the policy that is shipped for the environment."""
+    """Two names or path/to/file.py:Class; residual is the shipped policy of the environment."""
     set: Set = field(default_factory=list)
     seed: Seed = 0
-    """Of the world."""
+    """Seed of the world."""
     sensors: Sensors = "ideal"
     randomize: Randomize = "all"
-    """What the seed draws."""
+    """What the seed draws at random."""
     parameters: RigFile = None
     begin: Annotated[float, number("S")] = 0.5
-    """Time in the episode at which it begins."""
+    """Time of the episode at which the film begins."""
     end: Annotated[float, number("S")] = 6.5
-    """Time in the episode at which it ends."""
+    """Time of the episode at which the film ends."""
     rate: Annotated[Literal[10, 20, 25, 50], Parameter(metavar="HZ")] = 25
     """Frames per second: the period is a whole number of the 10 ms that a GIF counts in."""
     out: Path

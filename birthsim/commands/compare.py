@@ -22,24 +22,24 @@ ASKED = ("window", "multiple", "pressure_limit", "position_limit", "horizon")
 
 @dataclass(kw_only=True)
 class Settings(Logged):
-    r"""Play a log's openings and forces through the model of a rig: what it is off in each signal, where and when it leaves the
-    log. Several rigs are ranked.
+    r"""Play a log's openings and forces through the model of a rig: by how much it is off in each signal, and where and when
+    it departs from the log. Several rigs are ranked.
     """
 
     log: Annotated[Path, TABLE] = field(kw_only=False)
     """A table as birthsim identify reads it: time, openings, pressures, positions, forces."""
     parameters: Annotated[list[str] | None, MANY, Parameter(group=WORLD, metavar="FILE...")] = None
-    """TOML files of the rigs, else the paper's rig."""
+    """TOML files of the rigs. [default: the paper's rig]"""
     window: Annotated[float | None, number("S")] = None
-    """After how long the model is begun anew, else 0.25 s."""
+    """Time after which the model starts again from the log. [default: 0.25]"""
     multiple: Annotated[float | None, number("TIMES")] = None
-    """A free run has left the log where its error is so many times the noise, else 10."""
+    """A free run has departed from the log where its error is this many times the noise. [default: 10]"""
     pressure_limit: Annotated[float | None, number("PA")] = None
-    """Pressures leave the log at this error instead."""
+    """For pressures, this error instead."""
     position_limit: Annotated[float | None, number("M")] = None
-    """Positions leave the log at this error instead."""
+    """For positions, this error instead."""
     horizon: Annotated[float | None, number("S")] = None
-    """How long free runs are followed that begin all over the log, else 2 s."""
+    """Duration of the free runs, which begin all over the log. [default: 2]"""
     out: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     """Folder for report.md, compare.json, figures, and twin.rec, which birthsim live --replay plays."""
 

@@ -33,12 +33,12 @@ TAUGHT = {"environment": str, "sensors": str, "randomize": (bool, str), "validat
 class Settings(Configured):
     """Train recurrent policies, the students: from measurements alone they imitate teachers that know the true rig.
 
-    A folder gets the best student so far after every round. Interrupted, the same command goes on with the seeds that are not
-    done.
+    After every round the folder gets the best student so far. After an interruption the same command continues with the seeds
+    that are not complete.
     """
 
     teacher: Annotated[Path, Parameter(metavar="DIR")]
-    """Folder of the teachers, seed_0 and so on in it."""
+    """Folder of the teachers, which contains seed_0 and so on."""
     hidden: Annotated[int, whole(1, 512)] = Lessons.hidden
     """Cells of memory."""
     rounds: Annotated[int, whole(1, 1000)] = Lessons.rounds
@@ -46,12 +46,12 @@ class Settings(Configured):
     seed: Seed = 0
     """First seed, of teacher, weights and worlds."""
     seeds: Annotated[int, whole()] = 1
-    """Number of seeds, one after the other from --seed on."""
+    """Number of consecutive seeds, from --seed on."""
     jobs: Annotated[int, whole(), Parameter(group=PROCESSES)] = 1
-    """Seeds taught side by side."""
+    """Number of seeds taught in parallel."""
     parameters: RigFile = None
     out: Path
-    """Folder; each seed has one in it with its policy and curve."""
+    """Folder; each seed gets one in it with its policy and curve."""
 
 
 def main(settings: Settings) -> None:

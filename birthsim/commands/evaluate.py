@@ -24,25 +24,25 @@ from birthsim.command_line.settings import (
 
 @dataclass(kw_only=True)
 class Settings(Parts, Processes):
-    """Evaluate controllers: the same seeds, so the same worlds, for each of them.
+    """Evaluate controllers, each on the same seeds and therefore in the same worlds.
 
-    Without --controller and --policy it is backstepping. With --policy the trained residual runs beside the controllers named,
-    or else beside the paper's and the one that it corrects. What the output folder holds of the same settings, rig and code is
-    kept, so that an interrupted run goes on.
+    Without --controller and --policy the controller is backstepping. With --policy the trained residual is evaluated together
+    with the named controllers, or else with the paper's and the one that it corrects. Results that the output folder has of the
+    same settings, rig and code are kept, so that an interrupted run continues.
     """
 
     env: Env = "BirthSIM/Circle-v2"
     controller: Controllers = None
     policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
-    """For the controller residual: a folder that birthsim train wrote, or the name of what is shipped, such as circle."""
+    """For the controller residual: a folder that birthsim train wrote, or the name of a shipped policy, such as circle."""
     set: Set = field(default_factory=list)
     episodes: Annotated[int, whole(1, EPISODES)] = 32
     """Episodes of each controller."""
     seed: WorldSeed = 0
-    """Seed of the first episode, or a split where it begins: train, validation, scale, test. Results to report are of test."""
+    """Seed of the first episode, or a split, whose first seed it is: train, validation, scale, test. Report results of test."""
     sensors: Sensors = "ideal"
     randomize: Randomize = "all"
-    """What differs between episodes; sensors: the scenario, and the figures of honest sensors."""
+    """What differs between episodes; sensors means the scenario, and the parameters of honest sensors."""
     parameters: RigFile = None
     out: Path
     """Folder for evaluation.json, .md and .csv, and figures."""

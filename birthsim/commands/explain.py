@@ -21,7 +21,7 @@ class Settings(Configured):
     """
 
     policy: Annotated[str, Parameter(metavar="DIR")] = "circle"
-    """A folder that birthsim train wrote, or the name of what is shipped."""
+    """A folder that birthsim train wrote, or the name of a shipped policy."""
     no_pushes: bool = False
     """Leave out the stiffness test, which takes minutes."""
     out: Path

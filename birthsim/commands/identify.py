@@ -32,33 +32,33 @@ ONLY_WITH = {
 @dataclass(kw_only=True)
 class Settings(Logged):
     r"""Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and write the rig as
-    TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.
+    TOML. --propose writes an experiment that reveals them, and --simulate runs it on the simulator.
     """
 
     log: Annotated[Path | None, TABLE] = field(default=None, kw_only=False)
-    """A table of time, openings, pressures, positions, forces; the endings below."""
+    """The log: a table of time, openings, pressures, positions and forces, with one of the endings listed below."""
     friction_law: Literal["lugre", "coulomb", "elasto_plastic", "gms"] | None = None
-    """The friction law that is fitted, else the one that the log supports best."""
+    """The friction law to be fitted. [default: the one that the log supports best]"""
     propose: Annotated[Path | None, Parameter(metavar="PLAN")] = None
-    """Write an experiment as CSV: target, and openings to add."""
+    """Write an experiment as CSV: the target, and openings to add."""
     simulate: Annotated[Path | None, Parameter(metavar="PLAN")] = None
     """Run an experiment on the simulator and write its log."""
     valve_table: Annotated[Path | None, Parameter(metavar="TABLE")] = None
     """Fit the curve of the valves to a table of opening (-1 to 1) and flow."""
     valve: Literal["P1", "N1", "P2", "N2"] | None = None
-    """The chamber whose valve alone the table is of."""
+    """The chamber, if the table describes only one valve."""
     out: Path | None = None
-    """The rig, .toml; with --simulate the log, .csv, .parquet or .mcap."""
+    """File for the rig, .toml; with --simulate for the log, .csv, .parquet or .mcap."""
     report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     """Folder for report.md and figures of the residuals."""
     duration: Annotated[float | None, number("S")] = None
-    """Duration of the proposed experiment, else 12 s."""
+    """Duration of the proposed experiment. [default: 12]"""
     controller: Annotated[str | None, CONTROLLER] = None
-    """Controller of --simulate, else backstepping; for what a log tells it assumes the default rig."""
+    """Controller of --simulate; of what a log reveals it believes the default rig. [default: backstepping]"""
     sensors: Annotated[str | None, SENSORS] = None
-    """Sensors of --simulate, else lab."""
+    """Sensors of --simulate. [default: lab]"""
     seed: Seed = 0
-    """Of what is random."""
+    """Seed of everything random."""
     parameters: RigFile = None
 
 

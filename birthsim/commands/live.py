@@ -29,22 +29,22 @@ class Settings(Configured):
     """Play what the page recorded, .rec: pause, seek, slow motion. Or a log, as identify reads it, beside its twin: the rig of
     --parameters in free run under the log's openings and forces."""
     port: Annotated[int | None, whole(0, 65535)] = None
-    """0 takes any that is free; else 8000, with --replay 8001."""
+    """Port; 0 takes any that is free. [default: 8000, with --replay 8001]"""
     host: str = "127.0.0.1"
-    """Address or name to serve; other than the loopback it lets in everybody who can reach it."""
+    """Address or name to serve; any but the loopback lets in everybody who can reach it."""
     allowed_host: Annotated[list[str], MANY, Parameter(metavar="NAME...")] = field(default_factory=list)
-    """Names by which pages are opened besides, behind a published port or a proxy; with them --host may be 0.0.0.0."""
+    """Other names by which the page is opened, behind a published port or a proxy; with them --host may be 0.0.0.0."""
     request_time: Annotated[float, number("S", above=0.0, most=3600.0)] = 10.0
-    """Seconds in which a request must arrive; then its connection is closed."""
+    """Seconds after which a connection is closed whose request has not arrived."""
     parameters: RigFile = None
     controller: Annotated[str | None, Parameter(group=CONTROL, metavar="NAME")] = None
     """Open with it, as pid[bandwidth=60]; your own, path/to/file.py:Class, runs in Python, and the rig waits for it."""
     compare: Annotated[str | None, Parameter(group=CONTROL, metavar="NAME")] = None
     """Open with a second rig under this controller beside the first."""
     policy: Annotated[list[str], MANY, Parameter(group=CONTROL, metavar="DIR...")] = field(default_factory=list)
-    """To choose from besides what is shipped: folders that birthsim train wrote; the page opens with the first."""
+    """Policies in addition to the shipped ones: folders that birthsim train wrote; the page opens with the first."""
     static: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
-    """Write the page with its rig into this new folder, for any web server, and end."""
+    """Only write the page with its rig into this new folder, for any web server."""
 
 
 def main(settings: Settings) -> None:

@@ -8,16 +8,16 @@ from birthsim.command_line.settings import Controller, Env, Parts, Randomize, Ri
 
 @dataclass(kw_only=True)
 class Settings(Parts):
-    """Run one episode, print its error second by second, draw its motion."""
+    """Run one episode, print its error second by second, and draw its motion."""
 
     env: Env = "BirthSIM/Circle-v2"
     controller: Controller = "admittance"
     set: Set = field(default_factory=list)
     seed: Seed = 0
-    """Of the episode."""
+    """Seed of the episode."""
     sensors: Sensors = "ideal"
     randomize: Randomize = "none"
-    """What the seed draws."""
+    """What the seed draws at random."""
     parameters: RigFile = None
     style: Style = "screen"
     out: Path

@@ -14,35 +14,35 @@ class Settings(Processes):
     """Judge policies: score, success and settled error on feasible worlds, with 95 % intervals, and a row for the leaderboard.
 
     A policy is FILE.zip of Stable-Baselines3 (PPO, SAC, TQC, RecurrentPPO), a folder that birthsim train wrote, FILE.onnx,
-    path/to/file.py:Name, or the name of a controller or of a policy of the package. Several are training seeds of one entry. In
-    a suite {task} stands for the task's name and {scenario} for that of its scenario, where each has a policy of its own.
-    Stable-Baselines3's loader unpickles archives, so that they may run code of whoever made them.
+    path/to/file.py:Name, or the name of a controller or of a policy of the package. Several policies are training seeds of one
+    entry. If each task of a suite has its own policy, {task} stands for the name of the task and {scenario} for that of its
+    scenario. Stable-Baselines3 unpickles archives, which can run any code: judge only archives whose maker you trust.
 
-    The folder keeps what is complete: after Ctrl-C or a kill the same command goes on.
+    The folder keeps complete results: after Ctrl-C or a kill the same command continues.
     """
 
     policy: Annotated[list[str], MANY, Parameter(metavar="POLICY...")] = field(kw_only=False)
-    """What is judged."""
+    """The policy to be judged, in one of the forms above."""
     suite: Annotated[Literal["classic", "open", "all"] | None, Parameter(group=WORLD)] = None
     """Every task of a suite, or of all, instead of one environment."""
     tasks: Annotated[list[str] | None, MANY, Parameter(group=WORLD, metavar="TASK...")] = None
-    """Tasks of the suites by their names, instead of a whole suite."""
-    env: Annotated[str | None, Parameter(group=WORLD, metavar="ID", help="Environment, else BirthSIM/Circle-v2.")] = None
+    """Tasks of the suites by their names, instead of a whole suite; write POLICY before this option."""
+    env: Annotated[str | None, Parameter(group=WORLD, metavar="ID", help="Environment. [default: BirthSIM/Circle-v2]")] = None
     sensors: Sensors = "ideal"
     no_force_sensor: Annotated[bool, Parameter(group=WORLD)] = False
-    """The hand's force is not measured."""
+    """Do not measure the hand's force."""
     episodes: Annotated[int, whole(1, EPISODES)] = 64
-    """Worlds of each task."""
+    """Number of worlds of each task."""
     seed: WorldSeed | None = None
-    """Seed of the first world, or a split where it begins, else test."""
+    """Seed of the first world, or a split, whose first seed it is. [default: test]"""
     policy_period: Annotated[float, number("s", above=0.0, most=1.0)] = 0.01
-    """Between two actions of an archive, an ONNX file or a function."""
+    """Time between two actions of an archive, an ONNX file or a function."""
     normalize: Annotated[str | None, Parameter(metavar="FILE")] = None
-    """What VecNormalize.save wrote, for an archive."""
+    """For an archive: the file that VecNormalize.save wrote."""
     name: Annotated[str | None, Parameter(metavar="NAME")] = None
-    """What the row calls the entry, else the name of the policy."""
+    """Name of the entry in its row. [default: the name of the policy]"""
     out: Path
-    """Folder for score.json and what is complete."""
+    """Folder for score.json and results so far."""
 
 
 def main(settings: Settings) -> None:

@@ -35,9 +35,9 @@ class Settings:
     config: Annotated[str, Parameter(metavar="NAME")] = "circle"
     """A configuration of agents/configurations, such as circle_quick, rig_reader for a network that reads rigs, or a file."""
     algorithm: Annotated[str | None, ALGORITHM] = None
-    """How it learns, one of those below; hyperparameters that the configuration does not say are its own."""
+    """How it learns, one of the algorithms listed below; it sets the hyperparameters that the configuration leaves out."""
     law: Annotated[str | None, Parameter(metavar="NAME")] = None
-    """Controller underneath, such as backstepping-force-first; none: the policy drives the valves by itself."""
+    """Controller to be corrected, such as backstepping-force-first; none: the policy drives the valves alone."""
     impedance: Literal["fixed", "variable_kp", "variable"] | None = None
     """What an action changes besides forces."""
     authority: Annotated[float | None, Parameter(metavar="N")] = None
@@ -47,13 +47,13 @@ class Settings:
     until: Annotated[float | None, Parameter(metavar="PERCENT")] = None
     """Stop once the validation error is this far below that of the paper's controller."""
     seed: Seed | None = None
-    """First seed, else the configuration's, 0."""
+    """First seed. [default: that of the configuration, 0]"""
     seeds: Annotated[int, whole()] = 1
-    """Number of seeds, one after the other from --seed on."""
+    """Number of consecutive seeds, from --seed on."""
     jobs: Annotated[int, whole(), Parameter(group=PROCESSES)] = 1
-    """Seeds trained side by side."""
+    """Number of seeds trained in parallel."""
     out: Path
-    """Folder; each seed has one in it with its policy, checkpoint, curve and events."""
+    """Folder; each seed gets one in it with its policy, checkpoint, curve and events."""
     env: Env | None = None
     sensors: Sensors | None = None
     randomize: Randomize | None = None

@@ -190,7 +190,7 @@ def search(
 
 @dataclass(kw_only=True)
 class Settings(Parts):
-    """Tune a controller's gains on randomised rigs; interrupted (Ctrl-C), the same command carries on."""
+    """Tune a controller's gains on randomised rigs; after an interruption (Ctrl-C) the same command continues."""
 
     controller: Annotated[str, CONTROLLER]
     """A name, or path/to/file.py:Class whose TUNABLE has the range of each gain."""
@@ -198,13 +198,13 @@ class Settings(Parts):
     trials: Annotated[int, whole(1, TRIALS)] = 60
     """Sets of gains to try."""
     seed: Seed = 0
-    """Of the search."""
+    """Seed of the search."""
     sensors: Annotated[str, SENSORS, Parameter(validator=named("sensors", "both"))] = "both"
     """Sensor model; both: ideal and lab."""
     start: Path | None = None
-    """A gains.json, for trial 0, else the middle of every range."""
+    """A gains.json with the gains of trial 0. [default: the middle of every range]"""
     lanes: Annotated[int, whole(1, LANES)] = 32
-    """Rigs of each scenario."""
+    """Number of rigs of each scenario."""
     friction: Friction | None = None
     parameters: RigFile = None
     out: Path

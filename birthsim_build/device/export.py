@@ -20,8 +20,9 @@ def write_programs(
 ) -> tuple[list[str], int, dict[str, int]]:
     """Write ``NAME.bin`` and ``NAME.json`` of loops (scenario, sensors, controller) into ``folder``.
 
-    Returns the functions that the code must have, rows of a thread's memory, and bytes of data of a lane by name. A lane begins
-    any episode of any seed. The words are those of ``program``; the JSON names rows of the data.
+    Returns the functions that the code must contain, the rows of memory that a thread needs, and by the name of each loop the
+    bytes of data of a lane. A lane can begin the episode of any seed. ``NAME.bin`` has the words of a
+    ``birthsim_build.device.program``, and ``NAME.json`` the rows of its data by name.
     """
     made: dict[str, tuple[Episodes, Pieces, Pieces]] = {}
     for scenario, sensors, controller in loops:
@@ -40,7 +41,7 @@ def write_programs(
 
 
 def rows_of(episodes: Episodes, pieces: Pieces, program: Program) -> dict[str, Any]:
-    """Name -> row of the data, of all that is one number a lane: what stages share, reward, ends and info."""
+    """Name -> row of the data, for all that is one number per lane: what stages share, reward, ends and info."""
     regions = {key_of(array): region for array, region in zip(pieces.arrays(), program.regions, strict=True)}
     rows: dict[str, int] = {}
     placed = [*pieces.world, *((array, WORLD + row) for array, row in pieces.seen)]

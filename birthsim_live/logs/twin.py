@@ -1,7 +1,7 @@
 """A log beside its twin as a recording that the page plays: first the log, and as the rig beside it the model in free run.
 
-The target of both is where the log has its head, so that the page's error of the second is by how far the model is off. Between
-two samples of the log both are taken from a straight line.
+The target of both is the position of the head in the log. The error that the page shows for the second rig is therefore that of
+the model. Between two samples of the log both are interpolated linearly.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import COLUMNS, EVERY, FIELDS, FORMAT, SLICES, packed
 
 MOST = 100_000
-"""Rows of a file, of a quarter of what the page reads; longer logs have them farther apart."""
+"""Most rows of a file, which then has a quarter of the size that the page reads; longer logs have rows farther apart."""
 
 
 def write_twin(one: Compared, trial: Trial, path: Path) -> None:
@@ -49,7 +49,7 @@ def write_twin(one: Compared, trial: Trial, path: Path) -> None:
 
 
 def _at(track: Track, times: Array, part: float) -> Array:
-    """What the log has of a track of one window at ``times`` (T,), less a ``part`` of the error."""
+    """The values of a track of one window at ``times`` (T,), less a ``part`` of the error: 0 gives the log, and 1 the model."""
     known = np.isfinite(track.measured[0])
     values = track.measured[0, known] - part * track.error[0, known]
     return np.asarray(np.interp(times, track.times[0, known], values))
@@ -68,7 +68,7 @@ def _placed(values: dict[str, Array], rig: Parameters) -> tuple[Array, Array]:
 
 
 def _pressures(values: dict[str, Array], rig: Parameters) -> Array:
-    """Of all chambers (T, 4), Pa; those of a locked cylinder have the atmosphere."""
+    """Absolute pressures of all chambers (T, 4), Pa; those of a locked cylinder are at atmospheric pressure."""
     topology, still = rig.linkage.topology, rig.air.atmospheric_pressure
     first = next(iter(values.values()))
     return np.transpose(

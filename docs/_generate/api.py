@@ -30,6 +30,19 @@ BEYOND = {
 """Package -> names that pages speak of, beside those in its ``__all__``."""
 
 
+SUBJECTS = {
+    "environments": ("birthsim.envs", "birthsim.names", "birthsim_env.registry", "birthsim_env.scores"),
+    "scenarios": ("birthsim_env.parts",),
+    "rig": ("birthsim_env.physics",),
+    "linear": ("birthsim_env.gradients",),
+    "controllers": ("baselines.controller", "baselines.named", "baselines.staged", "birthsim_env.loop"),
+    "evaluation": ("baselines.bench", "birthsim.benchmark"),
+    "logs": ("baselines.identification", "birthsim.identification"),
+    "learning": ("agents", "birthsim.exporting", "birthsim.training"),
+}
+"""Page of the package ``birthsim`` -> modules of which it documents the names."""
+
+
 class _Bare(str):
     """An annotation, printed without quotes."""
 
@@ -38,17 +51,48 @@ class _Bare(str):
 
 def api(package: str) -> str:
     """A directive for every public name of a package, in alphabetical order; what the front door has too stands there alone."""
+    known = _known(package)
+    own = {name: known[name] for name in sorted(known) if known[name][0].startswith(f"{package}.")}
+    return "\n\n".join([_index(package, known), *(_entry(*one) for one in own.values())])
+
+
+def front() -> str:
+    """The names of ``birthsim``, which are documented on a page for each subject."""
+    return _index("birthsim", _known("birthsim"))
+
+
+def subject(name: str) -> str:
+    """A directive for every name of ``birthsim`` that belongs to one of ``SUBJECTS``."""
+    return "\n\n".join(_entry(*one) for _, one in sorted(_known("birthsim").items()) if _subject(one[1]) == name)
+
+
+def _subject(thing: object) -> str:
+    found = [name for name, places in SUBJECTS.items() if any(f"{thing.__module__}.".startswith(f"{one}.") for one in places)]
+    if len(found) != 1:
+        raise ValueError(f"{thing.__module__} = module of a name of birthsim has subjects {found}; allowed: one of SUBJECTS")
+    return found[0]
+
+
+def _known(package: str) -> dict[str, tuple[str, object]]:
+    """Name -> (where it is documented, what it is), of a package's ``__all__`` and of ``BEYOND``."""
     module = import_module(package)
     known = {name: (f"{package}.{name}", getattr(module, name)) for name in module.__all__}
     for dotted in BEYOND[package]:
         place, _, name = dotted.rpartition(".")
         known[name] = (f"{package}.{dotted}", getattr(import_module(f"{package}.{place}"), name))
-    own = dict(known)
-    for name in sorted({*known} & {*birthsim.__all__} if package != "birthsim" else ()):
-        if known[name][1] is getattr(birthsim, name):
-            known[name] = f"birthsim.{name}", own.pop(name)[1]
-    words = "\n".join(f"- {{py:obj}}`{known[name][0]}`: {_first(known[name][1])}" for name in sorted(known))
-    return "\n\n".join([inspect.getdoc(module) or "", words, *(_entry(*own[name]) for name in sorted(own))])
+    for name, (_, thing) in known.items():
+        if name in birthsim.__all__ and thing is getattr(birthsim, name):
+            known[name] = f"birthsim.{name}", thing
+    return known
+
+
+def _index(package: str, known: dict[str, tuple[str, object]]) -> str:
+    """What a package says of itself, and a line for each name; one that another page documents has its place here too."""
+    lines = []
+    for _, (dotted, thing) in sorted(known.items()):
+        place = f'<span id="{dotted}"></span>' if package == "birthsim" else ""
+        lines.append(f"- {place}{{py:obj}}`{dotted}`: {_first(thing)}")
+    return f"{inspect.getdoc(import_module(package)) or ''}\n\n" + "\n".join(lines)
 
 
 def _entry(dotted: str, thing: object) -> str:

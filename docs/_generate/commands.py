@@ -3,21 +3,48 @@
 from typing import Any
 
 from birthsim.command_line.command import program
-from birthsim.main import COMMANDS, load, overview
+from birthsim.main import GROUPS, load
 from birthsim_env.registry import entries
+
+UNSECTIONED = ("export", "study")
+"""Commands without options of their own: what follows them decides."""
 
 
 def commands() -> str:
-    """A section for every command that parses options itself, and for every form of ``birthsim export``."""
-    typed = {name: one for name, one in COMMANDS.items() if name not in ("export", "study")}
+    """A table of every group of commands, whose rows lead to their options, and are where those stood on one page."""
+    return "\n\n".join(f"## {title.capitalize()}\n\n{_group_table(title)}" for title in GROUPS)
+
+
+def page_of(title: str) -> str:
+    """The name of the page of a group, and of its generated part."""
+    return title.replace(" ", "_")
+
+
+def _group_table(title: str) -> str:
+    rows = ["| command | what it does |", "|---|---|"]
+    for name, one in GROUPS[title].items():
+        page = "../laboratory/index.md" if name == "study" else f"commands/{page_of(title)}.md"
+        place = page if name in UNSECTIONED else f"{page}#birthsim-{name}"
+        rows.append(f'| <span id="birthsim-{name}"></span>[`birthsim {name}`]({place}) | {one.does} |')
+    return "\n".join(rows)
+
+
+def group(title: str) -> str:
+    """A section for every command of a group that parses options itself, or for every form of ``birthsim export``."""
+    typed = {name: one for name, one in GROUPS[title].items() if name not in UNSECTIONED}
     sections = [_of(name, load(name).Settings, f"{name} {one.example}") for name, one in typed.items()]
+    return "\n\n".join([*sections, *(_exports() if "export" in GROUPS[title] else ())])
+
+
+def _exports() -> list[str]:
     forms: dict[type[Any], list[str]] = {}
     for form in entries("export"):
         forms.setdefault(form.made.settings, []).append(form.name)
     examples = {form.name: form.made.example for form in entries("export")}
-    for settings, names in forms.items():
-        sections.append(_of(f"export --to {', '.join(names)}", settings, f"export --to {names[0]} {examples[names[0]]}"))
-    return "\n\n".join([f"```text\n{overview()}\n```", *sections])
+    return [
+        _of(f"export --to {', '.join(names)}", settings, f"export --to {names[0]} {examples[names[0]]}")
+        for settings, names in forms.items()
+    ]
 
 
 def _of(name: str, settings: type[Any], example: str) -> str:

@@ -7,18 +7,33 @@ from birthsim_env.physics.rig.parameters import DECLARED, SECTIONS
 
 
 def rig() -> str:
-    """A section with a table for each part of a rig."""
-    return "\n\n".join(_section(name, part) for name, part in SECTIONS.items())
+    """A section with a table for each part of a rig, but for its electronics; parts of one kind share theirs."""
+    kinds: dict[type[Section], dict[str, Section]] = {}
+    for name, part in SECTIONS.items():
+        if name != "electronics":
+            kinds.setdefault(type(part), {})[name] = part
+    return "\n\n".join(f"## {', '.join(f'`{name}`' for name in parts)}\n\n{_section(parts)}" for parts in kinds.values())
 
 
-def _section(name: str, part: Section) -> str:
-    about = (type(part).__doc__ or "").partition(f"\n\n{LISTED}")[0].replace("\n    ", "\n")
+def electronics() -> str:
+    """The table of the control board and the sensors."""
+    return _section({"electronics": SECTIONS["electronics"]})
+
+
+def _section(parts: dict[str, Section]) -> str:
+    """What parts of one kind are, and their table; where they differ, a cell has the value of each in order."""
+    first, *_ = parts.values()
+    about = (type(first).__doc__ or "").partition(f"\n\n{LISTED}")[0].replace("\n    ", "\n")
     rows = [["parameter", "default", "unit", "allowed", "drawn from", "meaning", "source"]]
-    for own, one in part.parameters.items():
-        value = getattr(part, own)
-        shown = f"`{value!r}`" if isinstance(value, str) else f"{value:.6g}"
-        rows.append([f"`{own}`", shown, one.unit.removeprefix("-"), _allowed(one), _drawn(one), one.about, one.source])
-    return f"## `{name}`\n\n{about}\n\n{_table(rows)}"
+    for own in first.parameters:
+        each = [_row(part.parameters[own], getattr(part, own)) for part in parts.values()]
+        rows.append([f"`{own}`", *("; ".join(dict.fromkeys(cells)) for cells in zip(*each, strict=True))])
+    return f"{about}\n\n{_table(rows)}"
+
+
+def _row(one: Parameter, value: float | str) -> tuple[str, ...]:
+    shown = f"`{value!r}`" if isinstance(value, str) else f"{value:.6g}"
+    return shown, one.unit.removeprefix("-"), _allowed(one), _drawn(one), one.about, one.source
 
 
 def options() -> str:

@@ -1,6 +1,7 @@
 """The documentation site: pages have their places, generated parts know everything, tables sort, it builds."""
 
 import csv
+import fnmatch
 import os
 import re
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import birthsim
 from agents.training.configuration import configuration_names
 from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
@@ -84,13 +86,21 @@ def parts(generated):
 def test_generated_parts_know_everything(parts):
     commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
     ids = [name for name in environment_ids() if "Residual" not in name]
-    fields = [name for section in Parameters().to_dict().values() for name in section]
+    rig = Parameters().to_dict()
+    electronics, rig = rig.pop("electronics"), [name for section in rig.values() for name in section]
     for part, known in (
-        *(("commands.md", commands), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)),
+        *(
+            ("commands*.md", commands),
+            ("environments.md", ids),
+            ("metrics.md", UNITS),
+            ("rig.md", rig),
+            ("electronics.md", electronics),
+        ),
         *(("sensors.md", names("sensors")), ("hands.md", names("hand")), ("frictions.md", names("friction"))),
         *(("readers.md", names("reader")), ("configurations.md", [*configuration_names(), "rig_reader", "vacuum_apg"])),
     ):
-        assert [name for name in known if f"`{name}`" not in parts[part]] == [], part
+        text = "".join(parts[one] for one in fnmatch.filter(parts, part))
+        assert [name for name in known if f"`{name}`" not in text] == [], part
 
 
 @pytest.mark.parametrize("name", sorted({resolved(name)[0] for name in names("controller")}))
@@ -111,8 +121,9 @@ def test_each_option_and_gain_of_a_controller_has_its_meaning_and_what_is_allowe
 
 
 def test_pages_of_the_code_spell_out_arguments_and_defaults(parts):
-    front, *others = (parts[f"api_{package}.md"] for package in ("birthsim", "birthsim_env", "baselines", "agents"))
-    pages = "".join(others)
+    front = "".join(text for name, text in parts.items() if name.startswith("api_birthsim_") and name != "api_birthsim_env.md")
+    pages = "".join(parts[f"api_{package}.md"] for package in ("birthsim_env", "baselines", "agents"))
+    assert [name for name in birthsim.__all__ if f"## `{name}`" not in front] == []
     assert "HAS_DEFAULT_FACTORY" not in front + pages
     assert "**arguments" not in pages  # make takes those of any environment
     assert (front + pages).count("sensors: str = 'ideal', randomize: Randomize = False") == 3
@@ -210,7 +221,7 @@ NOTEBOOKS = [page for page, text in PAGES.items() if "{code-cell}" in text]
 BRIEF = ("tutorials/first_episode",)
 """Notebooks that a commit runs; the others weekly."""
 
-LARGE = ("laboratory/comparison", "environments/index", "environments/circle", "reference/commands")
+LARGE = ("laboratory/comparison", "environments/index", "environments/circle", "reference/commands/measure")
 """Pages of which each takes axe half a minute."""
 
 

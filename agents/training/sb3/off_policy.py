@@ -15,37 +15,37 @@ REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones"
 """Arrays in which past steps are remembered."""
 
 BUFFER = 300_000
-"""Policy steps that are remembered."""
+"""How many policy steps are remembered."""
 
 CRITIC = [128, 128]
 """Units of the critics' layers; assumed."""
 
 FOLLOWED = 0.02
-"""How far target critics follow their critics at an update; assumed. It is four times what Stable-Baselines3 has, because there
-are few updates to a step."""
+"""Fraction by which target critics approach their critics at an update; assumed. It is four times that of Stable-Baselines3,
+because there are few updates per step."""
 
 RANDOM = 20
-"""Steps of all lanes under random actions, before anything is learned; assumed."""
+"""Steps of every lane under random actions before learning begins; assumed."""
 
 
 class OffPolicy(ByStableBaselines):
-    """After every step of all lanes ``gradient_steps`` updates, each from ``batch`` past steps: lanes/gradient_steps policy
-    steps to an update.
+    """After every step of all lanes come ``gradient_steps`` updates, each from ``batch`` past steps: an update for
+    every lanes / gradient_steps policy steps.
 
-    Entropy is worth 1 at the beginning, as in Stable-Baselines3, so that a policy stays near the controller until its critics
-    have learned. Within 1,250 updates of a trial it became 1.6 times as bad as the controller with 0.1, and 4 to 9 times with
-    0.01.
+    The coefficient of the entropy is 1 at the beginning, as in Stable-Baselines3, so that a policy stays near the controller
+    until its critics have learned. In a trial with a coefficient of 0.1, the error became 1.6 times that of the controller
+    within 1,250 updates, and with 0.01 it became 4 to 9 times that.
     """
 
     hyperparameters = MappingProxyType({"lanes": 64, "batch": 256, "gradient_steps": 8})
-    """Found by trial: an update to 8 steps. On a short stiffness test 3,000 took a fifth off the controller's error, and
-    470, in 15,000 steps with an update to 32, nothing. The batch is Stable-Baselines3's."""
+    """An update for every 8 steps was found by trial: on a short stiffness test 3,000 updates reduced the controller's error by
+    a fifth, whereas 470 updates, one for every 32 of 15,000 steps, did not reduce it. The batch is Stable-Baselines3's."""
 
     def between(self, settings: TrainingSettings) -> int:
         return settings.lanes
 
     def remembering(self, settings: TrainingSettings) -> dict[str, Any]:
-        """Arguments that they have in common."""
+        """Arguments that SAC and TQC have in common."""
         from agents.training.sb3.networks import activation
 
         return {
@@ -63,7 +63,7 @@ class OffPolicy(ByStableBaselines):
         return Parts(policy.actor.latent_pi, policy.actor.mu, squashed=True)
 
     def begin(self, policy: Any, settings: TrainingSettings) -> None:
-        """With the spread of ``log_std`` everywhere, which the observation shifts later."""
+        """Begin with the spread of ``log_std`` everywhere; later it depends on the observation."""
         from agents.training.sb3.networks import begin_at
 
         super().begin(policy, settings)

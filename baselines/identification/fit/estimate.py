@@ -28,16 +28,16 @@ TOLERANCE = 1e-7
 which 0.5 is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way."""
 
 GOOD = 1.1
-"""Residuals over the noise of neighbouring samples up to which a search has found the rig, and does not begin elsewhere too."""
+"""Residuals over the noise of neighbouring samples; up to this ratio a search has found the rig, and none begins elsewhere."""
 
 BEGINNING = 0.4
-"""Of the budget that is left, what each of the first searches may take: one that loses its way leaves the rest."""
+"""Fraction of the remaining budget that each of the first searches may take, so that one that goes astray leaves the rest."""
 
 MOVED, MOST_ROUNDS = 0.05, 3
-"""A search is repeated where noise moves by more than this fraction, or the latency by half a period; so many at most."""
+"""A search is repeated where the noise changes by more than this, or the latency by half a period; at most so often."""
 
 MOST_WEIGHTS = 3
-"""Times that a search is repeated with new weights (``robust``) at most."""
+"""How often a search is repeated at most with new weights (``robust``)."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Fit:
     ended: bool = True
 
     def is_good(self, noise: Noise) -> bool:
-        """Whether the residuals are not more than a ``noise`` leaves."""
+        """Whether the residuals are no larger than this ``noise`` explains."""
         return self.noise.pressure < GOOD * noise.pressure and self.noise.position < GOOD * noise.position
 
     @property
@@ -67,8 +67,8 @@ class Fit:
 
 
 def search(problem: Problem, theta: Array, most: int, weights: int | None = None) -> Fit:
-    """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations, again while weights change: with
-    at most so many ``weights``, or ``MOST_WEIGHTS``."""
+    """``least_squares`` from coordinates ``theta`` (Q,), with at most ``most`` evaluations. It is repeated while the weights
+    change, at most ``weights`` times, or ``MOST_WEIGHTS``."""
     low, high = problem.limits
     place = np.clip(theta, low + 1e-6, high - 1e-6)
     with problem.explained():
