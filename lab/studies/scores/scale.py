@@ -31,7 +31,7 @@ APART = 1000
 
 STILL = "shut-valves"
 FINDS_RIG = "admittance[finds_rig=true]"
-"""A classical controller that has no name of its own."""
+"""A classical controller that has no name of its own, for rigs of two cylinders."""
 
 _CAPTION = (
     "Settled errors, geometric mean over the feasible ones of {measured}, in brackets the 95 % interval over episodes. The "
@@ -43,7 +43,8 @@ _CAPTION = (
 def _candidates(task: str) -> list[str]:
     """Classical controllers that can do a task."""
     own = find_task(task)
-    return [name for name in (*default_controllers(), FINDS_RIG) if own.force_sensor or not uses_force(name)]
+    finds_rig = [] if own.rig.linkage.is_rail else [FINDS_RIG]
+    return [name for name in (*default_controllers(), *finds_rig) if own.force_sensor or not uses_force(name)]
 
 
 def _tasks(own: Sequence[str], options: Options) -> dict[Any, Task]:
