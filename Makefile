@@ -49,7 +49,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
 # Policies by gradients: those with a configuration of their own; environments of circle_apg.
-CONFIGURED := probe_apg circle_residual_apg circle_lab_apg
+CONFIGURED := probe_apg circle_residual_apg circle_lab_apg rail_apg
 BY_GRADIENTS := circle:Circle-v2 descent:Descent-v2 forceps:Forceps-v2 dystocia:Dystocia-v2 vacuum:Vacuum-v1
 GRADIENTS := $(foreach one,$(BY_GRADIENTS),$(firstword $(subst :, ,$(one)))_apg) $(CONFIGURED)
 HONEST := circle_honest_apg

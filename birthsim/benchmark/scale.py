@@ -1,6 +1,6 @@
 """The scale of scores: logarithmic in the settled error, 0 for shut valves and 100 for the best classical controller.
 
-``birthsim study scale`` measures the errors of these two in every task and writes the file that lies beside this module.
+``birthsim study scale`` and ``scale-rail`` measure the errors of these two in every task, and write the files beside this one.
 """
 
 from functools import cache
@@ -15,7 +15,8 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Each
 
-FILE = Path(__file__).with_name("scale.json")
+FILES = [Path(__file__).with_name(name) for name in ("scale.json", "scale_rail.json")]
+"""One of each time that suites were measured: a suite that comes later leaves the scale of others as it is."""
 
 LEAST_ERROR = 1e-3
 """mm: a smaller settled error counts as this one. It is a hundredth of what the cameras resolve."""
@@ -29,8 +30,7 @@ _SCHEMA = {"tasks": Each({SHUT: _END, BEST: _END})}
 
 @cache
 def _tasks() -> dict[str, Any]:
-    found: dict[str, Any] = read_json("scale", FILE, _SCHEMA)["tasks"]
-    return found
+    return {name: own for file in FILES for name, own in read_json("scale", file, _SCHEMA)["tasks"].items()}
 
 
 def ends(task: str) -> dict[str, Any] | None:

@@ -23,8 +23,8 @@ class Settings(Processes):
 
     policy: Annotated[list[str], MANY, Parameter(metavar="POLICY...")] = field(kw_only=False)
     """The policy to be judged, in one of the forms above."""
-    suite: Annotated[Literal["classic", "open", "all"] | None, Parameter(group=WORLD)] = None
-    """Every task of a suite, or of all, instead of one environment."""
+    suite: Annotated[Literal["classic", "open", "rail", "all"] | None, Parameter(group=WORLD)] = None
+    """Every task of a suite, or of classic and open (all), instead of one environment."""
     tasks: Annotated[list[str] | None, MANY, Parameter(group=WORLD, metavar="TASK...")] = None
     """Tasks of the suites by their names, instead of a whole suite; write POLICY before this option."""
     env: Annotated[str | None, Parameter(group=WORLD, metavar="ID", help="Environment. [default: BirthSIM/Circle-v2]")] = None

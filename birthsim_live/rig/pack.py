@@ -77,7 +77,7 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     # The code serves worn valves and tubes too, and a start that leaves what any of them remembers.
     worn, tubes = column.copy(), column.copy()
     worn[at.PLAY], tubes[at.TUBE_LENGTH] = 0.01, 1.0
-    learns = [LEARNING] if policies else []
+    learns = [LEARNING] if policies and not rig.linkage.is_rail else []
     chosen = [*names("controller", listed=True), *(f"{RESIDUAL}:{one}" for one in policies), *learns, *others]
     period = rig.electronics.control_period
     start, rest = start_stages(np.zeros((Start.size, 1)), column[:, 0], plant(tubes))

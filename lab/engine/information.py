@@ -9,8 +9,10 @@ from typing import NamedTuple
 
 from baselines.controller import RESIDUAL
 from baselines.named import bare_name, learns_mass, uses_force
+from birthsim.benchmark.contestant import TRAINING, training_of
+from birthsim_env.ids import rig_for
 from birthsim_env.physics.compiled.sources import ROOT
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.registry import entry, names
 
 COLUMNS = ("rig", "mass learned", "force sensed")
@@ -70,8 +72,17 @@ def informed_if_registered(name: str, *sensors: str) -> list[str]:
 
 @cache
 def _learns(name: str, sensors: tuple[str, ...], parameters: str) -> bool:
-    rig = load_parameters(str(ROOT / parameters) if parameters else None)
+    rig = load_parameters(str(ROOT / parameters)) if parameters else _default_rig(name)
     return any(learns_mass(name, entry("sensors", one).made.sampled, rig) for one in sensors)
+
+
+def _default_rig(name: str) -> Parameters:
+    """The default rig; of a policy that comes with the package that of its scenario, which has one cylinder on a rail."""
+    policy = name.removeprefix(f"{RESIDUAL}:")
+    if policy == name or policy not in names("policy"):
+        return Parameters()
+    trained = training_of(next(entry("policy", policy).made.glob(f"seed_*/{TRAINING}")))
+    return rig_for(trained["settings"]["environment"], None) if trained else Parameters()
 
 
 def _yes(fact: bool) -> str:

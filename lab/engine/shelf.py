@@ -27,6 +27,7 @@ DATA = ROOT / "docs" / "data"
 ELSEWHERE = {
     "reference_returns.json": ROOT / "birthsim_env" / "scores.json",
     "scale.json": ROOT / "birthsim" / "benchmark" / "scale.json",
+    "scale_rail.json": ROOT / "birthsim" / "benchmark" / "scale_rail.json",
 }
 """Texts that do not stand in ``DATA``."""
 

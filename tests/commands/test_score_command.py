@@ -103,7 +103,7 @@ def test_every_task_has_a_scale_of_which_a_point_resolves_a_tenth_of_an_error(ta
 
 
 def test_a_task_of_no_suite_has_success_and_errors_but_no_score(tmp_path, monkeypatch, capsys):
-    given = ("pid", "--env", RAIL, "--episodes", 2, "--jobs", 1, "--out", tmp_path / "out")
+    given = ("pid", "--env", RAIL, "--sensors", "honest", "--episodes", 2, "--jobs", 1, "--out", tmp_path / "out")
     status, printed, complained = call("score", monkeypatch, capsys, *given)
     assert status == 0, complained
     assert "no score: only tasks of the suites have a scale" in printed
@@ -124,7 +124,7 @@ def test_tasks_are_chosen_by_name(tmp_path, monkeypatch, capsys):
     assert row["given"] == ["shut-valves"]
     assert "interquartile mean of 2 tasks" in printed
     every = plan("pid", None, "ideal", True, "all", None, 1, 0, 0.01, None, None)
-    assert every.tasks == tuple(TASKS.values())
+    assert every.tasks == (*SUITES["classic"], *SUITES["open"])
 
 
 def test_several_policies_are_the_seeds_of_one_entry(tmp_path, monkeypatch, capsys):
@@ -217,6 +217,13 @@ def test_every_task_of_a_suite_begins(task):
     assert len({tuple(column) for column in drawn.T}) == 3, "rigs are drawn"
     assert (np.abs(worlds.measurement.user_force).max() == 0.0) >= (not task.force_sensor)
     worlds.close()
+
+
+def test_one_cylinder_has_a_suite_of_its_own_and_policies_of_two_are_refused_there():
+    kinds = {suite: {task.rig.linkage.kind for task in tasks} for suite, tasks in SUITES.items()}
+    assert kinds == {"classic": {"two-cylinders"}, "open": {"two-cylinders"}, "rail": {"rail"}}
+    with pytest.raises(ValueError, match=r"maps 36 to 4 numbers; allowed: 18 to 2"):
+        birthsim.score("circle_apg", suite="rail", episodes=1, progress=False)
 
 
 def test_tasks_have_names_of_their_own_and_say_what_differs():

@@ -67,7 +67,8 @@ def test_every_environment_has_a_piece_that_names_its_records():
     said = records.record("BirthSIM/Circle-v2")
     for task in ("circle-ideal", "circle-lab", "circle-honest", "circle-honest-no-force", "circle-honest-wide"):
         assert f"`{task}`" in said
-    assert records.record("BirthSIM/Rail-v0").startswith("No task")
+    assert "| `rail-encoders` | `rail` |" in records.record("BirthSIM/Rail-v0")
+    assert records.record("BirthSIM/RailResidual-v0").startswith("No task")
 
 
 def test_a_suite_has_a_score_only_where_all_its_tasks_are(known):

@@ -22,6 +22,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import evaluate_piece
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from birthsim import evaluation as command
+from birthsim_env.ids import rig_for
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import names
 from lab.studies.scores.study import _contestants
@@ -149,9 +150,10 @@ def test_shipped_policies_load_fit_and_are_small(name):
     assert [place.name for place in places] == [f"seed_{k}" for k in range(len(places))]
     for place in places:
         policy = read_policy(place)
-        assert policy.network.inputs == len(observation_names(policy.settings))
         assert sum(path.stat().st_size for path in place.iterdir()) < 60_000
         training = json.loads((place / "training.json").read_text(encoding="utf-8"))
+        rig = rig_for(training["settings"]["environment"], None)
+        assert policy.network.inputs == len(observation_names(policy.settings, rig))
         assert training["policy"]["pooled_mm"] == policy.training["reached"]["pooled_mm"]
     reached = [read_policy(place).training["reached"]["pooled_mm"] for place in places]
     assert best_policy(name) == places[int(np.argmin(reached))]

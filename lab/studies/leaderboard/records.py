@@ -129,7 +129,7 @@ def records(suite: str, known: Known) -> str:
 
 
 def record(environment: str) -> str:
-    """A table of an environment: its tasks of both suites, how open each is, and the score to beat, with a word on both."""
+    """A table of an environment: its tasks of the suites, how open each is, and the score to beat, with a word on both."""
     known = every_entry()
     tasks = [one for one in TASKS.values() if one.environment == environment]
     if not tasks:

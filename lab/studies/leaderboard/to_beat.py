@@ -2,7 +2,7 @@
 
 import re
 
-from birthsim.benchmark.suites import TASKS
+from birthsim.benchmark.suites import SUITES, BenchmarkTask
 from birthsim_env.physics.compiled.sources import ROOT
 from lab.engine.tables import markdown
 from lab.studies.leaderboard import who
@@ -21,14 +21,15 @@ KINDS = {
     "honest-friction": "`honest`, unexpected friction",
     "honest-wide": "`honest`, rigs far outside the training ranges",
 }
-"""A task's name without its scenario -> words."""
+"""A task's name without its scenario -> words, of the rig with two cylinders."""
+
+RAIL = "one cylinder on a rail"
 
 
 def to_beat(known: Known) -> str:
     """For each kind of tasks the paper's controller, and the best entries that have all of them, learned and not."""
     rows = [["tasks", "paper's controller", "best classical", "its score", "its success", "best learned", "its score"]]
-    for kind, words in KINDS.items():
-        tasks = [task for task in TASKS.values() if task.name.partition("-")[2] == kind]
+    for words, tasks in _groups().items():
         found = over_all(tasks, known)
         papers = next((one.shown for one in found if one.name == PAPERS), "-")
         classical = next((one for one in found if not who.is_learned(one.said)), None)
@@ -37,6 +38,13 @@ def to_beat(known: Known) -> str:
         taught = [f"`{learned.name}`", learned.shown] if learned else ["-"] * 2
         rows.append([f"{words} ({len(tasks)})", papers, *best, *taught])
     return markdown(rows)
+
+
+def _groups() -> dict[str, list[BenchmarkTask]]:
+    """Words -> tasks of a row."""
+    two = [*SUITES["classic"], *SUITES["open"]]
+    kinds = {words: [task for task in two if task.name.partition("-")[2] == kind] for kind, words in KINDS.items()}
+    return {**kinds, RAIL: list(SUITES["rail"])}
 
 
 def in_readme(table: str) -> str:

@@ -3,6 +3,8 @@
 Of the worlds of the split ``scale`` the first choose the best controller, and others, ``APART`` seeds later, measure it.
 """
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from baselines.bench.statistics import crossed_interval
 from baselines.named import make_controller, uses_force
 from baselines.work.tasks import Result, Task
 from birthsim.benchmark.scale import BEST, SHUT, counted_error
-from birthsim.benchmark.suites import TASKS, find_task
+from birthsim.benchmark.suites import SUITES, TASKS, find_task
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.registry import register
 from birthsim_env.splits import SCALE
@@ -24,15 +26,12 @@ from lab.engine.tables import markdown
 from lab.engine.worlds import worlds
 from lab.studies.comparison.grid import default_controllers
 
-FILE = "scale.json"
-"""What stands in ``birthsim/benchmark``."""
-
 APART = 1000
 """Seeds between the first world that chooses and the first that measures."""
 
 STILL = "shut-valves"
 FINDS_RIG = "admittance[finds_rig=true]"
-"""A classical controller that has no name of its own."""
+"""A classical controller that has no name of its own, for rigs of two cylinders."""
 
 _CAPTION = (
     "Settled errors, geometric mean over the feasible ones of {measured}, in brackets the 95 % interval over episodes. The "
@@ -44,24 +43,23 @@ _CAPTION = (
 def _candidates(task: str) -> list[str]:
     """Classical controllers that can do a task."""
     own = find_task(task)
-    return [name for name in (*default_controllers(), FINDS_RIG) if own.force_sensor or not uses_force(name)]
+    finds_rig = [] if own.rig.linkage.is_rail else [FINDS_RIG]
+    return [name for name in (*default_controllers(), *finds_rig) if own.force_sensor or not uses_force(name)]
 
 
-def _tasks(options: Options) -> dict[Any, Task]:
-    """Those that choose: (task, controller) -> its piece."""
+def _tasks(own: Sequence[str], options: Options) -> dict[Any, Task]:
+    """Those that choose in ``own`` tasks: (task, controller) -> its piece."""
     return {
-        (task, name): _task("chosen", task, name, options.choosing, options.seed)
-        for task in TASKS
-        for name in _candidates(task)
+        (task, name): _task("chosen", task, name, options.choosing, options.seed) for task in own for name in _candidates(task)
     }
 
 
-def _further(options: Options, found: Found) -> dict[Any, Task]:
+def _further(own: Sequence[str], options: Options, found: Found) -> dict[Any, Task]:
     """Those that measure, once the best are known: (task, role)."""
     if any(key[1] in (SHUT, BEST) for key in found):
         return {}
     every: dict[Any, Task] = {}
-    for task in TASKS:
+    for task in own:
         best = min(_candidates(task), key=lambda name: float(np.mean(found[task, name]["logs"])))
         for role, where, name in ((SHUT, _with_same_plants(task), STILL), (BEST, task, best)):
             every[task, role] = _task("measured", where, name, options.episodes, options.seed + APART)
@@ -106,7 +104,7 @@ def _kept(_: Options, found: Found) -> Any:
     return kept
 
 
-def _shown(content: Content) -> dict[str, str]:
+def _shown(stem: str, content: Content) -> dict[str, str]:
     settings = content["settings"]
     said = _CAPTION.format(
         measured=worlds(settings["seed"] + APART, settings["episodes"]), chosen=worlds(settings["seed"], settings["choosing"])
@@ -116,20 +114,27 @@ def _shown(content: Content) -> dict[str, str]:
         factor = (own[SHUT]["error_mm"] / own[BEST]["error_mm"]) ** 0.01
         rows.append([task, _error(own[SHUT]), f"`{own[BEST]['controller']}`", _error(own[BEST]), f"{factor:.3f}"])
     own = {name: content[name] for name in ("command", "commit", "date", "settings")}
-    return {"scale.md": f"{said}\n\n{markdown(rows)}\n", FILE: written({**own, "tasks": content["figures"]})}
+    return {f"{stem}.md": f"{said}\n\n{markdown(rows)}\n", f"{stem}.json": written({**own, "tasks": content["figures"]})}
 
 
 def _error(own: dict[str, Any]) -> str:
     return f"{own['error_mm']:.3g} [{own['low']:.3g}, {own['high']:.3g}]"
 
 
-STUDY = Study(
-    {"choosing": 16, "episodes": 256, "seed": SCALE.first},
-    _tasks,
-    _kept,
-    {"error_mm": "mm", "low": "mm", "high": "mm", "episodes": ""},
-    _shown,
-    words={"choosing": "Worlds that choose the best controller", "episodes": "Worlds that measure it"},
-    further=_further,
-)
+def _study(stem: str, *suites: str) -> Study:
+    """Of some suites, whose tables and values stand in the files ``stem``."""
+    own = [task.name for suite in suites for task in SUITES[suite]]
+    return Study(
+        {"choosing": 16, "episodes": 256, "seed": SCALE.first},
+        partial(_tasks, own),
+        _kept,
+        {"error_mm": "mm", "low": "mm", "high": "mm", "episodes": ""},
+        partial(_shown, stem),
+        words={"choosing": "Worlds that choose the best controller", "episodes": "Worlds that measure it"},
+        further=partial(_further, own),
+    )
+
+
+STUDY = _study("scale", "classic", "open")
 register(study="scale", about="the ends of the benchmark's scale: shut valves, best")(STUDY)
+register(study="scale-rail", about="the ends of the scale in the suite of one cylinder")(_study("scale_rail", "rail"))

@@ -34,6 +34,18 @@ def test_a_page_has_a_policy_of_ones_own_and_another_rig(tmp_path):
     assert np.isfinite(end.of("position")).all()
 
 
+def test_on_a_rail_its_policy_drives_and_none_is_learned(tmp_path):
+    packed = packed_page(RIG.replace({"linkage.kind": "rail"}))
+    listed = {one["name"]: one for one in packed.content["hello"]["choices"]["controller"]}
+    assert "learning" not in listed
+    assert [name for name in listed if name.startswith("residual:")] == ["residual:rail_apg"]
+    write_page(tmp_path / "page", packed)
+    settings = {"controller": "residual:rail_apg", "scenario": "rail", "sensors": "ideal"}
+    end = run(tmp_path / "page", [("set", settings), ("reset", None), ("advance", 1500)])[0][-1]
+    assert end.lost is None
+    assert np.abs(end.of("position") - end.of("target")).max() < 0.01
+
+
 def test_a_policy_that_remembers_has_a_memory_in_the_page():
     name = "circle_honest_student"
     memory = controller_parts(ResidualController(RIG, name))["sampled"]["policy"].stages[-1].memory
