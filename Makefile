@@ -49,11 +49,12 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
 # Policies by gradients: those with a configuration of their own; environments of circle_apg.
-CONFIGURED := probe_apg circle_residual_apg circle_lab_apg rail_apg
+CONFIGURED := probe_apg circle_residual_apg circle_lab_apg rail_apg honest_apg
 BY_GRADIENTS := circle:Circle-v2 descent:Descent-v2 forceps:Forceps-v2 dystocia:Dystocia-v2 vacuum:Vacuum-v1
 GRADIENTS := $(foreach one,$(BY_GRADIENTS),$(firstword $(subst :, ,$(one)))_apg) $(CONFIGURED)
-HONEST := circle_honest_apg
-LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
+# Those that learn with sensors whose bias somebody has calibrated away.
+CALIBRATED := circle_honest_apg no_force_apg
+LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(CALIBRATED)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 # Films of docs/environments: environment, file, and the seconds that are shown; a file has less than 400 kB.
@@ -229,7 +230,8 @@ policies: $(READY)
 	  $(BIN)/birthsim train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; done
 	for one in $(BY_GRADIENTS); do id=$${one#*:}; $(BIN)/birthsim train --config circle_apg \
 	  --env BirthSIM/$${id%-*}Residual-$${id#*-} --seeds 5 --jobs 2 --out $(OUT)/training/$${one%:*}_apg || exit 1; done
-	$(BIN)/birthsim train --config $(HONEST) --seeds 5 --jobs 2 --parameters examples/calibrated_sensors_rig.toml --out $(OUT)/training/$(HONEST)
+	for name in $(CALIBRATED); do $(BIN)/birthsim train --config $$name --seeds 5 --jobs 2 \
+	  --parameters examples/calibrated_sensors_rig.toml --out $(OUT)/training/$$name || exit 1; done
 	$(BIN)/birthsim train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
 	$(BIN)/birthsim distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
 	  --out $(OUT)/training/$(STUDENT)

@@ -6,7 +6,7 @@ may therefore run code of whoever made it.** Nothing else of it is run here.
 
 import os
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,10 +36,11 @@ UNUSED = ("lr_schedule", "clip_range", "clip_range_vf", "action_noise", "ep_info
 
 
 class ModelPolicy:
-    """Observations (N, D) -> deterministic actions (N, n) of a ``model``, which sees what ``normalize`` makes of them."""
+    """Observations (N, D) -> deterministic actions (N, n) of a ``model``, which sees what a ``VecNormalize`` with its
+    ``statistics`` makes of them; None where it sees them as they are."""
 
-    def __init__(self, model: Any, normalize: Callable[[NDArray[Any]], NDArray[Any]] | None = None) -> None:
-        self._model, self._normalize = model, normalize
+    def __init__(self, model: Any, statistics: Any = None) -> None:
+        self.model, self.statistics = model, statistics
         self._state: Any = None
         self._begins: NDArray[np.bool_] = np.ones(0, dtype=np.bool_)
 
@@ -47,8 +48,8 @@ class ModelPolicy:
         lanes = len(observation)
         if len(self._begins) != lanes:
             self._state, self._begins = None, np.ones(lanes, dtype=np.bool_)
-        seen = observation if self._normalize is None else self._normalize(observation)
-        actions, self._state = self._model.predict(seen, state=self._state, episode_start=self._begins, deterministic=True)
+        seen = observation if self.statistics is None else self.statistics.normalize_obs(observation)
+        actions, self._state = self.model.predict(seen, state=self._state, episode_start=self._begins, deterministic=True)
         self._begins = np.zeros(lanes, dtype=np.bool_)
         return np.asarray(actions)
 
@@ -70,12 +71,12 @@ def policy_of_model(model: Any, name: str, spaces: tuple[int, int]) -> ModelPoli
     ``spaces``, lengths of observation and action, are others."""
     check_spaces(model, name, spaces)
     statistics = model.get_vec_normalize_env()
-    return ModelPolicy(model, None if statistics is None or not statistics.norm_obs else statistics.normalize_obs)
+    return ModelPolicy(model, None if statistics is None or not statistics.norm_obs else statistics)
 
 
-def read_archive(path: Path, spaces: tuple[int, int], statistics: Path | None = None) -> ModelPolicy:
+def read_archive(path: Path, spaces: tuple[int, int] | None = None, statistics: Path | None = None) -> ModelPolicy:
     """The policy of an archive, with the ``statistics`` that ``VecNormalize.save`` wrote; ``ValueError`` for what is none, for
-    other ``spaces`` and where Stable-Baselines3 is missing."""
+    other ``spaces`` than those given, and where Stable-Baselines3 is missing."""
     kind = algorithm_in(path)
     try:
         algorithm = _algorithms()[kind]
@@ -86,8 +87,9 @@ def read_archive(path: Path, spaces: tuple[int, int], statistics: Path | None = 
         model = algorithm.load(path, device="cpu", custom_objects=instead)
     except Exception as error:  # whatever stands in it
         raise ValueError(f"policy = {named(path)} cannot be loaded ({problem(error)}); {ALLOWED}") from error
-    check_spaces(model, named(path), spaces)
-    return ModelPolicy(model, None if statistics is None else _normalizer(statistics, spaces[0]))
+    if spaces is not None:
+        check_spaces(model, named(path), spaces)
+    return ModelPolicy(model, None if statistics is None else _statistics(statistics, model.observation_space.shape))
 
 
 def algorithm_in(path: Path) -> str:
@@ -144,19 +146,19 @@ def _zero(_: float) -> float:
     return 0.0
 
 
-def _normalizer(path: Path, length: int) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    """``normalize_obs`` of what ``VecNormalize.save`` wrote."""
+def _statistics(path: Path, shape: tuple[int, ...]) -> Any:
+    """What ``VecNormalize.save`` wrote, of observations of a ``shape``."""
     allowed = "allowed: a file that save() of VecNormalize wrote"
     from stable_baselines3.common.save_util import load_from_pkl  # late: it takes seconds
 
     try:
         statistics: Any = load_from_pkl(path)
-        shape = np.shape(statistics.obs_rms.mean)
-        normalize: Callable[[NDArray[Any]], NDArray[Any]] = statistics.normalize_obs
+        has = np.shape(statistics.obs_rms.mean)
+        statistics.normalize_obs(np.zeros(has, dtype=np.float32))
     except OSError as error:
         raise ValueError(f"normalize = {named(path)} cannot be read ({error.strerror}); {allowed}") from error
     except Exception as error:  # whatever stands in it
         raise ValueError(f"normalize = {named(path)} cannot be loaded ({problem(error)}); {allowed}") from error
-    if shape != (length,):
-        raise ValueError(f"normalize = {named(path)} has statistics of {shown(shape)} numbers; allowed: ({length},)")
-    return normalize
+    if has != shape:
+        raise ValueError(f"normalize = {named(path)} has statistics of {shown(has)} numbers; allowed: {shape}")
+    return statistics

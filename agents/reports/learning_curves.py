@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from baselines.bench.statistics import crossed_interval, interquartile_mean
-from baselines.figures.style import ACCENT, COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, log_ticks, save
+from baselines.figures.style import ACCENT, COLUMN, DARK, MIDDLE, STYLE, headline, legend_below, log_ticks, look, save
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.json_reading import read_json
 from birthsim_env.physics.rig.schema import Listed
@@ -93,14 +93,14 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
 def draw_side_by_side(trainings: Mapping[str, Sequence[dict[str, Any]]], folder: Path, name: str) -> list[Path]:
     """Draw pooled errors of the trainings of each algorithm over policy steps and over wall time (``name``, PNG and SVG)."""
     with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(1, 2, figsize=(COLUMN, 2.5), layout="constrained", sharey=True)
+        figure, panels = plt.subplots(1, 2, figsize=(COLUMN, 2.2 + 0.17 * len(trainings)), layout="constrained", sharey=True)
         measures, finals = (("steps", 1e-6, "policy steps (million)"), ("seconds", 1.0, "time (s)")), dict[str, list[float]]()
         for axes, (measure, unit, label) in zip(panels, measures, strict=True):
-            for color, style, (algorithm, own) in zip((ACCENT, MIDDLE), "-:", trainings.items(), strict=True):
+            for k, (algorithm, own) in enumerate(trainings.items()):
                 for training in own:
                     points = training["curve"][1:]
                     at, error = ([_number(point[key]) for point in points] for key in (measure, "pooled_mm"))
-                    axes.plot(unit * np.array(at), error, color=color, ls=style, label=algorithm)
+                    axes.plot(unit * np.array(at), error, label=algorithm, **look(k, markers=False))
                     finals.setdefault(algorithm, []).append(error[-1])
             axes.set(yscale="log", xlim=0, xlabel=label)
         log_ticks(panels[0].yaxis, 1.0, 3.0)

@@ -3,11 +3,12 @@
 import inspect
 from typing import Any
 
+from agents.policy.shipped import loadable_for
 from baselines import make_controller
 from baselines.named import GUARDING, compiled_names, known_options, learns_mass, resolved, uses_force, with_brackets
 from baselines.staged import StagedController
 from birthsim_env import Parameters
-from birthsim_env.registry import Entry, entries
+from birthsim_env.registry import Entry, entries, entry
 
 FAMILIES = {
     "backstepping": ("baselines.backstepping.", "baselines.rivals.abry"),
@@ -18,6 +19,9 @@ FAMILIES = {
 
 WITH_ACCELERATION = Parameters().replace({"electronics.acceleration_bandwidth": 300.0})
 """A rig with an acceleration sensor."""
+
+ON_A_RAIL = Parameters().replace({"linkage.kind": "rail"})
+"""A rig of one cylinder."""
 
 FRACTION = ("1", "part of the believed Coulomb friction that is fed forward along the reference")
 POSITION_LOOP = ("1/s", r"$\omega$, bandwidth of the position loop")
@@ -108,9 +112,13 @@ def controllers() -> str:
     heads = ("name", "what it is", "needs", "learns the mass", "reads acceleration", "compiled")
     table = _table(heads, rows)
     policies = [
-        (f"`{name}`", _needs(one, name), _yes(learns_mass(name)))
-        for one in entries("policy")
-        for name in [f"residual:{one.name}"]
+        (
+            f"`residual:{name}`",
+            _needs(entry("policy", name), f"residual:{name}"),
+            _yes(learns_mass(f"residual:{name}", parameters=rig)),
+        )
+        for rig in (Parameters(), ON_A_RAIL)
+        for name in loadable_for(rig)
     ]
     short = [(f"`{one.name}`", whole) for one in entries("controller") if (whole := _short_for(one.name))]
     return "\n\n".join(

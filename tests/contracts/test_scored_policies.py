@@ -6,6 +6,7 @@ import zipfile
 
 import gymnasium as gym
 import numpy as np
+import onnxruntime
 import pytest
 import torch
 from sb3_contrib import TQC, RecurrentPPO
@@ -14,12 +15,14 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 import birthsim
 from agents import SB3VecEnv
+from agents.foreign.onnx_export import TOLERANCE, export_archive
 from agents.foreign.policies import read_policy_file
 from agents.foreign.stable_baselines import algorithm_in
 from agents.policy.onnx_export import export_onnx
 from agents.policy.seeds import load_policy
 from baselines.bench.evaluation import evaluate
 from birthsim_env.ids import rig_for
+from tests.console import call
 
 PROBE, RAIL = "BirthSIM/Probe-v3", "BirthSIM/Rail-v0"
 SEED, LANES = 80_000, 3
@@ -127,6 +130,62 @@ def test_onnx_does_what_the_policy_does(name, tmp_path):
     laws = read_policy_file(str(path), rig, 0.01), birthsim.make_controller(f"residual:{name}", rig)
     one, other = (evaluate("BirthSIM/Circle-v2", law, "", LANES, SEED, progress=False, **world).traces[0] for law in laws)
     np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [PPO, SAC, TQC, RecurrentPPO])
+def test_an_archive_becomes_data_that_acts_as_it_does(kind, tmp_path):
+    model, path = made(kind), tmp_path / "model.onnx"
+    model.save(tmp_path / "model.zip")
+    exported = export_archive(tmp_path / "model.zip", path)
+    assert 0 <= exported.difference <= TOLERANCE
+    assert exported.size == path.stat().st_size
+    said = json.loads(path.with_suffix(".json").read_text())
+    assert said["settings"] | {"algorithm": kind.__name__, "seed": 1, "gamma": model.gamma} == said["settings"]
+    assert said["steps"] == 0
+    session, rng = onnxruntime.InferenceSession(path.read_bytes()), np.random.default_rng(3)
+    held = {one.name: np.zeros((LANES, one.shape[1]), np.float32) for one in session.get_inputs()[1:]}
+    assert bool(held) == (kind is RecurrentPPO)
+    state, begins = None, np.ones(LANES, dtype=bool)
+    for _ in range(5):
+        seen = rng.normal(size=(LANES, 24)).astype(np.float32)
+        expected, state = model.predict(seen, state=state, episode_start=begins, deterministic=True)
+        actions, *after = session.run(None, {session.get_inputs()[0].name: seen, **held})
+        held, begins = dict(zip(held, after, strict=True)), np.zeros(LANES, dtype=bool)
+        np.testing.assert_allclose(actions, expected, atol=TOLERANCE)
+    laws = [read_policy_file(str(one), rig_for(PROBE, None), 0.01) for one in (tmp_path / "model.zip", path)]
+    one, other = (evaluate(PROBE, law, "", LANES, SEED, progress=False, **SHORT).traces[0] for law in laws)
+    np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+def test_data_of_an_archive_holds_its_normalisation(tmp_path, monkeypatch, capsys):
+    worlds = VecNormalize(SB3VecEnv(gym.make_vec(PROBE, num_envs=LANES, randomize=True, autoreset_mode="SameStep", **SHORT)))
+    model = PPO("MlpPolicy", worlds, n_steps=8, batch_size=8, seed=2, device="cpu").learn(48)
+    model.save(tmp_path / "model.zip")
+    worlds.save(str(tmp_path / "statistics.pkl"))
+    given = ("export", monkeypatch, capsys, "--to", "onnx", tmp_path / "model.zip")
+    status, printed, complained = call(*given, "--normalize", tmp_path / "statistics.pkl")
+    assert status == 0, complained
+    assert "model.onnx" in printed
+    seen = 3.0 * np.random.default_rng(4).normal(size=(8, 24)).astype(np.float32)
+    (actions,) = onnxruntime.InferenceSession((tmp_path / "model.onnx").read_bytes()).run(None, {"observation": seen})
+    normalised, bare = (model.predict(one, deterministic=True)[0] for one in (worlds.normalize_obs(seen), seen))
+    np.testing.assert_allclose(actions, normalised, atol=TOLERANCE)
+    assert np.abs(actions - bare).max() > 100 * TOLERANCE
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--to", "onnx", "circle", "--normalize", "x.pkl"), ("normalize = 'x.pkl'", "allowed: with FILE.zip")),
+        (("--to", "hub", "model.zip"), ("policy = 'model.zip'", "allowed: with --to onnx")),
+        (("--to", "onnx", "missing.zip"), ("missing.zip", "PPO, SAC, TQC")),
+    ],
+)
+def test_an_export_of_what_is_no_archive_is_refused(given, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    status, _, complained = call("export", monkeypatch, capsys, *given)
+    assert status
+    assert all(part in complained for part in said), complained
 
 
 WRONG = {

@@ -200,12 +200,26 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
     return draw_learning_curves(learning_curves(policy_folders("circle")), folder)
 
 
+SIDE_BY_SIDE = {
+    "from_scratch": {"gradients": "circle_apg", "PPO": "circle_pure"},
+    "ways_of_learning": {
+        "gradients": "circle_apg",
+        "gradients, on a controller": "circle_residual_apg",
+        "PPO": "circle_pure",
+        "PPO, on a controller": "circle",
+    },
+}
+"""Picture -> what is side by side in it: a way of learning and the shipped policy that learned so, with ideal sensors."""
+
+
 def _side_by_side(content: Content, folder: Path) -> list[Path]:
     from agents.reports.learning_curves import draw_side_by_side, learning_curves
 
-    from_scratch = {"gradients": "circle_apg", "PPO": "circle_pure"}
-    curves = {algorithm: learning_curves(policy_folders(name)) for algorithm, name in from_scratch.items()}
-    return draw_side_by_side(curves, folder, "from_scratch")
+    drawn = []
+    for name, policies in SIDE_BY_SIDE.items():
+        curves = {way: learning_curves(policy_folders(policy)) for way, policy in policies.items()}
+        drawn += draw_side_by_side(curves, folder, name)
+    return drawn
 
 
 UNITS = {"settled_rms": "mm", "stiffness_error": "%", "noticed": "1", "energy": "mJ", "air": "l/min", "saturation": "%"}
