@@ -1,6 +1,7 @@
 """What is to beat: the records of the benchmark in a matrix, and the returns that controllers and policies reach."""
 
 import csv
+import json
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ from _generate.tables import table
 from birthsim.benchmark.suites import TASKS
 from birthsim_env.parts.scenarios import environment_id, find_scenario
 from birthsim_env.physics.rig.topology import RAIL
-from birthsim_env.registry import names
+from birthsim_env.registry import entries, names
 from birthsim_env.scores import BEST, reference_returns
 from lab.studies.leaderboard.records import every_entry, openness, standings
 from lab.studies.leaderboard.who import title
@@ -67,8 +68,16 @@ def _returns(scenario: str, sensors: str) -> list[str]:
     cells = [known[roles["paper's law"]["controller"]]]
     for role in (BEST, POLICY):
         who = roles[role]["controller"] if role in roles else ""
-        cells.append(f"{known[who]}, `{who.partition(' ')[0]}`" if who else "none")
+        cells.append(f"{known[who]}, `{who.partition(' ')[0]}`" if who else _without(scenario, sensors))
     return cells
+
+
+def _without(scenario: str, sensors: str) -> str:
+    """What is said where there is no return: whether a policy comes with the package that was trained there."""
+    files = (next(one.made.glob("seed_*/training.json")) for one in entries("policy"))
+    trained = (json.loads(file.read_text(encoding="utf-8"))["settings"] for file in files)
+    there = (environment_id(scenario, "Residual"), sensors)
+    return "not measured" if there in ((own["environment"], own["sensors"]) for own in trained) else "none"
 
 
 def page_of(scenario: str) -> str:
