@@ -13,6 +13,7 @@ from birthsim.benchmark.scoring import judge, plan
 from birthsim.benchmark.suites import SUITES
 from lab.engine.shelf import DATA
 from lab.studies.leaderboard import entries, records, repeat
+from lab.studies.leaderboard.seeds import seeds
 
 PID = entries.ENTRIES / "pid.json"
 REPEATED = {"pid": 3, "circle_honest_apg": 3}
@@ -69,6 +70,19 @@ def test_every_environment_has_a_piece_that_names_its_records():
         assert f"`{task}`" in said
     assert "| `rail-encoders` | `rail` |" in records.record("BirthSIM/Rail-v0")
     assert records.record("BirthSIM/RailResidual-v0").startswith("No task")
+
+
+def test_each_seed_learns_a_rail_in_a_minute_to_three_tenths_of_a_millimetre(known):
+    table = seeds("rail-ideal", "rail_apg", ("pid",), known)
+    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    assert [row[0] for row in rows] == [*(f"`rail_apg seed_{k}`" for k in range(5)), "`pid`"]
+    errors = next(row for row in known["rail_apg"]["tasks"] if row["task"] == "rail-ideal")["errors"]
+    for (_, seconds, median, _, largest, lost), own in zip(rows[:5], errors, strict=True):
+        assert float(seconds) < 60
+        assert float(median) == pytest.approx(np.median(own), rel=5e-3)
+        assert float(largest) == pytest.approx(max(own), rel=5e-3)
+        assert float(median) < 0.3
+        assert lost == "0 of 64"
 
 
 def test_a_suite_has_a_score_only_where_all_its_tasks_are(known):
