@@ -18,7 +18,7 @@ steps, seed = int(float(sys.argv[2])) if len(sys.argv) > 2 else 1_000_000, int(s
 lanes, rollout, batch, gamma, trace = 64, 64, 512, 0.96, 0.95
 torch.manual_seed(seed), torch.set_num_threads(1)
 worlds = gym.wrappers.vector.RecordEpisodeStatistics(gym.make_vec(environment, num_envs=lanes, randomize=True))
-worlds = gym.wrappers.vector.NormalizeReward(gym.wrappers.vector.NormalizeObservation(worlds), gamma=gamma)
+worlds = gym.wrappers.vector.NormalizeReward(worlds, gamma=gamma)
 inputs, outputs = worlds.single_observation_space.shape[0], worlds.single_action_space.shape[0]
 
 
@@ -30,10 +30,9 @@ def network(size, gain):
 
 
 def act(observations):
-    """Actions (N, n) without exploration, for observations (N, D) that are normalised as in the training."""
-    scaled = (observations - worlds.env.obs_rms.mean) / np.sqrt(worlds.env.obs_rms.var + worlds.env.epsilon)
+    """Actions (N, n) without exploration, for observations (N, D)."""
     with torch.no_grad():
-        return actor(torch.as_tensor(scaled).float().clamp(-10, 10)).clamp(-1, 1).numpy()
+        return actor(torch.as_tensor(observations).float().clamp(-10, 10)).clamp(-1, 1).numpy()
 
 
 actor, critic, log_std = network(outputs, 0.01), network(1, 1.0), nn.Parameter(torch.zeros(outputs))
@@ -63,9 +62,9 @@ for update in range(steps // (lanes * rollout)):
         ratio, better = (new - old).exp(), (better - better.mean()) / (better.std() + 1e-8)
         loss = ((0.25 * miss - torch.minimum(ratio * better, ratio.clamp(0.8, 1.2) * better)) * one).mean()
         optimizer.zero_grad(), loss.backward(), nn.utils.clip_grad_norm_(parameters, 0.5), optimizer.step()
-    if update % 10 == 9 and worlds.env.env.return_queue:
-        paid = birthsim_env.normalized_return(environment, np.mean(worlds.env.env.return_queue))
-        length = np.mean(worlds.env.env.length_queue)
+    if update % 10 == 9 and worlds.env.return_queue:
+        paid = birthsim_env.normalized_return(environment, np.mean(worlds.env.return_queue))
+        length = np.mean(worlds.env.length_queue)
         print(
             f"{(update + 1) * lanes * rollout:9,} steps: episodes of {length:.0f} steps, normalised return {paid:.0f}",
             flush=True,

@@ -3,7 +3,7 @@
 from typing import Any
 
 from baselines.controller import RESIDUAL
-from birthsim.benchmark.contestant import PLACES, in_task
+from birthsim.benchmark.contestant import ONNX, PLACES, in_task
 from birthsim.benchmark.suites import TASKS
 from birthsim_env.registry import names
 from lab.engine import information
@@ -44,6 +44,8 @@ def facts(said: dict[str, Any]) -> list[str]:
     if name in names("policy"):
         name = f"{RESIDUAL}:{name}"
     rig, mass, force = information.informed_if_registered(name, *sensors)
+    if set(said["kinds"]) == {ONNX}:  # it has observations alone
+        mass, force = "no", "yes" if any(TASKS[one["task"]].force_sensor for one in said["tasks"]) else "no"
     return ["finds it out" if READS in given or FINDS in given else rig, mass, force]
 
 
