@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from agents.policy.shipped import loadable_for
 from agents.residual.settings import NO_LAW
 from baselines.inputs import COMMAND_OPTIONS
 from baselines.named import LIMITED, known_options, make_controller, resolved, uncontrolled_names
@@ -20,7 +21,8 @@ from tests.oracles import derived_law as derived
 
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
-POLICIES = [f"residual[policy={name}]" for name in names("policy")]
+SHIPPED = loadable_for(RIG)
+POLICIES = [f"residual[policy={name}]" for name in SHIPPED]
 CHOICES = [name for name in names("controller") if name != "admittance"]  # which is admittance-adaptive
 IDENTIFIED = "admittance[force_sensor=false,identified=true]"
 LAWS = [*CHOICES, IDENTIFIED, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
@@ -28,7 +30,7 @@ NAMES = [*LAWS, *POLICIES]
 # The code of a policy is that of ``residual``: what differs are its weights and the law inside. A commit takes one on a law,
 # one on the valves, and one that remembers.
 OFTEN = ("circle", "circle_lab_apg", "circle_honest_student")
-SELDOM = [() if name in OFTEN else (pytest.mark.weekly,) for name in names("policy")]
+SELDOM = [() if name in OFTEN else (pytest.mark.weekly,) for name in SHIPPED]
 PAIRS = [
     *thinned(LAWS, names("sensors")),
     *zip(POLICIES, itertools.cycle(names("sensors")), SELDOM, strict=False),

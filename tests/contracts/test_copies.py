@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from agents.policy.shipped import loadable_for
 from baselines.named import make_controller
 from birthsim_env import Parameters
 from birthsim_env.registry import names
@@ -16,7 +17,7 @@ NAMES = [
     *names("controller", listed=True),
     "limited:admittance-adaptive",
     "limited:residual:circle_lab_apg",
-    *(f"residual:{one}" for one in names("policy")),
+    *(f"residual:{one}" for one in loadable_for(RIG)),
 ]
 COPIES = {"copy": copy.deepcopy, "pickle": lambda law: pickle.loads(pickle.dumps(law))}
 

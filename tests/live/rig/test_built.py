@@ -56,7 +56,7 @@ def test_it_says_what_the_words_and_the_rig_say():
 
 def test_it_is_small():
     sizes = {path.name: path.stat().st_size for path in BUILT.iterdir()}
-    assert sum(sizes.values()) < 1.8e6
+    assert sum(sizes.values()) < 2e6  # of which a policy takes some 45 kB
     assert sum(size for name, size in sizes.items() if name.startswith("learn")) < 0.3e6
 
 
