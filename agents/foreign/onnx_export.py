@@ -3,25 +3,21 @@
 The file holds data alone, so that others can run it without trusting whoever made it, as the leaderboard asks.
 """
 
-import json
 import tempfile
-import warnings
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import torch
 from numpy.typing import NDArray
 
-from agents.foreign.onnx_file import OnnxPolicy
-from agents.foreign.stable_baselines import ModelPolicy, algorithm_in, one_thread, read_archive
-from agents.policy.onnx_export import INPUT, OPSET, OUTPUT
-from birthsim_env.files import whole_file, write_text
-from birthsim_env.physics.rig.json_reading import parse_json
+from agents.foreign.onnx_file import SUFFIX, OnnxPolicy
+from agents.foreign.stable_baselines import ModelPolicy, algorithm_in, one_thread, read_archive, settings_in
+from agents.policy.onnx_export import INPUT, OUTPUT, traced
+from birthsim_env.files import make_folder, whole_results, write_json
 from birthsim_env.physics.rig.reading import named
+from birthsim_env.physics.rig.values import shown
 
 TOLERANCE = 2.0**-14
 """Largest difference of an action in [-1, 1] from Stable-Baselines3's: both add some hundred singles of size 1 a layer, in an
@@ -50,14 +46,18 @@ class Exported:
 
 
 class _Acting(torch.nn.Module):
-    """Actions (N, n) for observations (N, D), both float32, and the next memories (N, cells) for those before."""
+    """The network of a policy of Stable-Baselines3 between what it observes and its deterministic actions.
+
+    It takes observations (N, D) and memories (N, cells), and gives actions (N, n) in [-1, 1] and the next memories. All are
+    float32.
+    """
 
     mean: torch.Tensor
     deviation: torch.Tensor
 
     def __init__(self, own: ModelPolicy) -> None:
         super().__init__()
-        self.policy, self.squashes = own.model.policy, hasattr(own.model.policy, "actor")
+        self.policy = own.model.policy
         self.clip = None if own.statistics is None else float(own.statistics.clip_obs)
         if self.clip is not None:
             seen = own.statistics.obs_rms
@@ -70,12 +70,16 @@ class _Acting(torch.nn.Module):
         """The LSTM of a policy that remembers, else None."""
         return getattr(self.policy, "lstm_actor", None)
 
+    @property
+    def cells(self) -> int:
+        """Length of each of its two memories."""
+        return int(self.memory.num_layers * self.memory.hidden_size)
+
     def forward(self, observation: torch.Tensor, *memories: torch.Tensor) -> tuple[torch.Tensor, ...]:
         x = observation
         if self.clip is not None:
             x = ((x.double() - self.mean) / self.deviation).clamp(-self.clip, self.clip).float()
-        if self.squashes:
-            actor = self.policy.actor
+        if (actor := getattr(self.policy, "actor", None)) is not None:  # of SAC and TQC
             return (torch.tanh(actor.mu(actor.latent_pi(actor.extract_features(x, actor.features_extractor)))),)
         x = self.policy.pi_features_extractor(x)
         if self.memory is not None:
@@ -85,56 +89,53 @@ class _Acting(torch.nn.Module):
             x = x.squeeze(0)
             memories = tuple(one.transpose(0, 1).flatten(1) for one in after)
         actions = self.policy.action_net(self.policy.mlp_extractor.forward_actor(x))
-        return actions.clamp(-1.0, 1.0), *memories
+        return torch.tanh(actions) if self.policy.squash_output else actions.clamp(-1.0, 1.0), *memories
 
 
 def export_archive(path: Path, out: Path, statistics: Path | None = None) -> Exported:
-    """Write the policy of the archive ``path`` to ``out``, with the ``statistics`` that ``VecNormalize.save`` wrote, and beside
-    it in ``out`` with the suffix .json how it was trained.
+    """Write the policy of an archive as an ONNX file, and beside it how it was trained, as far as the archive says.
 
-    The archive is read by Stable-Baselines3's own loader, which unpickles parts of it. Raises ``ValueError`` for what is no
-    archive, and where the file, run by onnxruntime, differs from Stable-Baselines3 by more than ``TOLERANCE``; nothing is
-    written then.
+    The archive is read by Stable-Baselines3's own loader, which unpickles parts of it.
+
+    Parameters
+    ----------
+    path : Path
+        The archive, FILE.zip.
+    out : Path
+        FILE.onnx, whose FILE.json is written too. Observations (N, D), actions (N, n) and memories (N, cells) are float32.
+    statistics : Path, optional
+        What ``VecNormalize.save`` wrote, where the policy was trained on normalised observations.
+
+    Raises
+    ------
+    ValueError
+        For what is no archive, for spaces other than lists of numbers, and where the file, run by onnxruntime, differs from
+        Stable-Baselines3 by more than ``TOLERANCE``; nothing is written then.
     """
+    if out.suffix != SUFFIX or out.is_dir():
+        raise ValueError(f"out = {named(out)}; allowed: FILE{SUFFIX}")
+    trained = _trained(path)
     own = read_archive(path, statistics=statistics)
-    (inputs,), (outputs,) = own.model.observation_space.shape, own.model.action_space.shape
+    spaces = own.model.observation_space, own.model.action_space
+    shapes: list[Any] = [getattr(space, "shape", None) for space in spaces]
+    if any(shape is None or len(shape) != 1 for shape in shapes):
+        raise ValueError(
+            f"policy = {named(path)} observes {shapes[0]} and gives {shapes[1]}; allowed: lists of numbers, as (24,)"
+        )
+    (inputs,), (outputs,) = shapes
+    module = _Acting(own).eval()
+    memory = {} if module.memory is None else dict.fromkeys(("hidden", "cell"), torch.zeros(1, module.cells))
     with one_thread():
-        content = _traced(_Acting(own).eval(), inputs)
+        given = {INPUT: torch.zeros(1, inputs), **memory}
+        content = traced(module, given, [OUTPUT, *(f"next_{name}" for name in memory)]).SerializeToString()
         difference = _difference(content, own, inputs)
     # What is not a number is not within the tolerance either.
     if not difference <= TOLERANCE:
         raise ValueError(f"policy = {named(path)}: actions differ in ONNX by {difference:.2g}; allowed: {TOLERANCE:.1g}")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(out) as file:
-        file.write(content)
-    write_text(out.with_suffix(".json"), json.dumps(_trained(path), indent=1) + "\n")
+    with whole_results(make_folder(out.parent)) as place:
+        (place / out.name).write_bytes(content)
+        write_json(place / out.with_suffix(".json").name, trained)
     return Exported(len(content), inputs, outputs, LANES * STEPS, difference)
-
-
-def _traced(module: _Acting, inputs: int) -> bytes:
-    names, nexts = ([], []) if module.memory is None else (["hidden", "cell"], ["next_hidden", "next_cell"])
-    zeros = [torch.zeros(1, inputs)]
-    if module.memory is not None:
-        zeros += [torch.zeros(1, module.memory.num_layers * module.memory.hidden_size)] * 2
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        place = Path(folder) / "policy.onnx"
-        # As in agents.policy.onnx_export. PyTorch warns of lengths that it fixes: of the network's layers, which are;
-        # and of an LSTM's batch, which is free here since memories are inputs.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        warnings.filterwarnings("ignore", "Exporting a model to ONNX with a batch_size")
-        warnings.simplefilter("ignore", torch.jit.TracerWarning)  # type: ignore[attr-defined]
-        torch.onnx.export(
-            module,
-            tuple(zeros),
-            place,
-            dynamo=False,
-            opset_version=OPSET,
-            input_names=[INPUT, *names],
-            output_names=[OUTPUT, *nexts],
-            dynamic_axes={name: {0: "batch"} for name in (INPUT, *names, OUTPUT, *nexts)},
-        )
-        onnx.checker.check_model(model := onnx.load(place), full_check=True)
-        return bytes(model.SerializeToString())
 
 
 def _difference(content: bytes, own: ModelPolicy, inputs: int) -> float:
@@ -159,8 +160,12 @@ def _difference(content: bytes, own: ModelPolicy, inputs: int) -> float:
 
 
 def _trained(path: Path) -> dict[str, Any]:
-    """How the policy of an archive was trained, as its settings say."""
-    with zipfile.ZipFile(path) as archive, archive.open("data") as data:
-        said = parse_json("data", data.read(), dict, finite=False)
-    plain = {name: said[name] for name in HYPERPARAMETERS if isinstance(said.get(name), (int, float, str))}
-    return {"settings": {"algorithm": algorithm_in(path), **plain}, "steps": int(said["num_timesteps"])}
+    """How the policy of an archive was trained, as its settings say; ``ValueError`` where they say no number of steps."""
+    said = settings_in(path)
+    steps = said.get("num_timesteps")
+    if type(steps) is not int:
+        raise ValueError(
+            f"policy = {named(path)}: num_timesteps = {shown(steps)}; allowed: a whole number, as save() writes it"
+        )
+    plain = {name: said[name] for name in HYPERPARAMETERS if isinstance(said.get(name), str | int | float)}
+    return {"settings": {"algorithm": algorithm_in(path), **plain}, "steps": steps}

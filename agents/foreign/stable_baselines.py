@@ -92,15 +92,21 @@ def read_archive(path: Path, spaces: tuple[int, int] | None = None, statistics: 
     return ModelPolicy(model, None if statistics is None else _statistics(statistics, model.observation_space.shape))
 
 
-def algorithm_in(path: Path) -> str:
-    """Which algorithm made an archive, by the names of its settings; nothing of it is unpickled. ``ValueError`` for another."""
+def settings_in(path: Path) -> dict[str, Any]:
+    """Settings of an archive, of which nothing is unpickled; ``ValueError`` for what is none."""
     if not os.path.isfile(path):
         raise ValueError(f"policy = {named(path)} does not exist; {ALLOWED}")
     try:
         with zipfile.ZipFile(path) as archive, archive.open("data") as data:
-            settings = parse_json("data", data.read(MOST), dict, finite=False)
+            settings: dict[str, Any] = parse_json("data", data.read(MOST), dict, finite=False)
     except Exception as error:  # of zipfile, zlib and the reader of JSON
         raise ValueError(f"policy = {named(path)} is no archive of Stable-Baselines3 ({problem(error)}); {ALLOWED}") from error
+    return settings
+
+
+def algorithm_in(path: Path) -> str:
+    """Which algorithm made an archive, by the names of its settings; ``ValueError`` for another."""
+    settings = settings_in(path)
     if "clip_range" in settings:
         kinds = [settings.get(name) for name in ("policy_class", "rollout_buffer_class")]
         recurrent = any("recurrent" in str(one.get("__module__", "")) for one in kinds if isinstance(one, Mapping))

@@ -8,6 +8,7 @@ has "memory" (N, cells) as a further input, zeros where an episode begins, and "
 import json
 import tempfile
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,7 +104,8 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     if path.is_dir():
         raise ValueError(f"{str(path)!r} is a folder; allowed: the name of a file")
     module = PolicyModule(network).eval()
-    model = _traced(module, network.inputs, network.cells)
+    memory = {MEMORY: torch.zeros(1, network.cells, dtype=torch.float64)} if network.cells else {}
+    model = traced(module, {INPUT: torch.zeros(1, network.inputs), **memory}, [OUTPUT, *([NEXT] if network.cells else [])])
     onnx.helper.set_model_props(
         model,
         {
@@ -114,7 +116,6 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
             "actions": json.dumps(actions),
         },
     )
-    onnx.checker.check_model(model, full_check=True)
     content = model.SerializeToString()
     exported = _checked(content, module, network)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -123,24 +124,43 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     return exported
 
 
-def _traced(module: PolicyModule, inputs: int, cells: int) -> Any:
-    zeros = {INPUT: torch.zeros(1, inputs), **({MEMORY: torch.zeros(1, cells, dtype=torch.float64)} if cells else {})}
-    outputs = [OUTPUT, *([NEXT] if cells else [])]
+def traced(module: torch.nn.Module, inputs: Mapping[str, torch.Tensor], outputs: Sequence[str]) -> Any:
+    """A module as a valid ONNX model whose named ``inputs``, of one lane (1, n) here, and ``outputs`` take any number of lanes.
+
+    Parameters
+    ----------
+    module : torch.nn.Module
+        It is called with the inputs in their order, and returns the outputs in theirs.
+    inputs : mapping
+        Name -> an example (1, n) of the type that the input has.
+    outputs : sequence of str
+        Names.
+
+    Raises
+    ------
+    onnx.checker.ValidationError
+        Where the model is none by ONNX's own rules.
+    """
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         path = Path(folder) / "policy.onnx"
         # PyTorch calls this exporter deprecated; the one that takes its place needs onnxscript, which nothing else here does.
         warnings.simplefilter("ignore", DeprecationWarning)
+        # It warns of what it fixes, the lengths of layers, and of an LSTM's lanes, which are free where memories are inputs.
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)  # type: ignore[attr-defined]
+        warnings.filterwarnings("ignore", "Exporting a model to ONNX with a batch_size")
         torch.onnx.export(
             module,
-            tuple(zeros.values()),
+            tuple(inputs.values()),
             path,
             dynamo=False,
             opset_version=OPSET,
-            input_names=list(zeros),
-            output_names=outputs,
-            dynamic_axes={name: {0: "batch"} for name in (*zeros, *outputs)},
+            input_names=list(inputs),
+            output_names=list(outputs),
+            dynamic_axes={name: {0: "batch"} for name in (*inputs, *outputs)},
         )
-        return onnx.load(path)
+        model = onnx.load(path)
+    onnx.checker.check_model(model, full_check=True)
+    return model
 
 
 def _checked(content: bytes, module: PolicyModule, network: PolicyNetwork) -> Exported:

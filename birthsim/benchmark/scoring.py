@@ -15,7 +15,7 @@ from baselines.work.tasks import Result, run_tasks
 from birthsim.benchmark.contestant import Contestant, contestants_of
 from birthsim.benchmark.pieces import score_under
 from birthsim.benchmark.row import overall, table, task_row
-from birthsim.benchmark.suites import SUITES, BenchmarkTask, find_suite, find_task, task_of
+from birthsim.benchmark.suites import BenchmarkTask, find_suite, find_task, task_of
 from birthsim.command_line.settings import EPISODES, JOBS_AT_MOST, LARGEST_SEED
 from birthsim.command_line.worlds import check_environment
 from birthsim_env.files import make_folder, own_folder, whole_results, write_json
@@ -30,9 +30,6 @@ NAME = "score.json"
 
 ENVIRONMENT = "BirthSIM/Circle-v2"
 """Where neither an environment nor a suite is asked for."""
-
-BOTH = "all"
-"""Every task of ``classic`` and ``open``; those of a rail have other spaces."""
 
 SENSORS = "ideal"
 """Where none are asked for."""
@@ -217,7 +214,7 @@ def _tasks(
         said = f"sensors = {shown(sensors)}, force_sensor = {shown(force_sensor)} with {several[0]}"
         raise ValueError(f"{said}; allowed: without them, each task of a suite has its own")
     if suite is not None:
-        return (*SUITES["classic"], *SUITES["open"]) if suite == BOTH else find_suite(suite)
+        return find_suite(suite)
     if tasks is not None:
         if isinstance(tasks, str) or not tasks or len(set(tasks)) < len(tasks):
             raise ValueError(f"tasks = {shown(tasks)}; allowed: a list of names of tasks, each once")

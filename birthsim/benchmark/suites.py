@@ -111,16 +111,20 @@ SUITES: dict[str, tuple[BenchmarkTask, ...]] = {
 }
 """Name -> tasks. A change of a suite takes a new name."""
 
+BOTH = "all"
+"""Name of ``classic`` and ``open`` together; tasks of a rail have other spaces."""
+
 TASKS = {one.name: one for tasks in SUITES.values() for one in tasks}
 """Name -> task, of every suite."""
 
 
 def find_suite(name: str) -> tuple[BenchmarkTask, ...]:
-    """The tasks of a suite; ``ValueError`` names those that there are."""
-    if not isinstance(name, str) or name not in SUITES:
-        asked = near(name, SUITES) if isinstance(name, str) else ""
-        raise ValueError(f"suite = {shown(name)}{asked}; allowed: {', '.join(SUITES)}")
-    return SUITES[name]
+    """The tasks of a suite, or of ``BOTH``; ``ValueError`` names those that there are."""
+    known = {**SUITES, BOTH: (*SUITES["classic"], *SUITES["open"])}
+    if not isinstance(name, str) or name not in known:
+        asked = near(name, known) if isinstance(name, str) else ""
+        raise ValueError(f"suite = {shown(name)}{asked}; allowed: {', '.join(known)}")
+    return known[name]
 
 
 def find_task(name: str) -> BenchmarkTask:

@@ -12,7 +12,7 @@ from agents.policy.seeds import policy_folders
 from baselines.bench.statistics import interquartile_mean, penalize_lost, stratified_interval
 from birthsim.benchmark.scale import BEST, SHUT, counted_error, ends, factor_per_point, score_of
 from birthsim.benchmark.scoring import plan
-from birthsim.benchmark.suites import SUITES, TASKS, find_task, task_of
+from birthsim.benchmark.suites import SUITES, TASKS, find_suite, find_task, task_of
 from birthsim_env.splits import TEST
 from tests.console import OWN, call, strict
 
@@ -125,6 +125,8 @@ def test_tasks_are_chosen_by_name(tmp_path, monkeypatch, capsys):
     assert "interquartile mean of 2 tasks" in printed
     every = plan("pid", None, "ideal", True, "all", None, 1, 0, 0.01, None, None)
     assert every.tasks == (*SUITES["classic"], *SUITES["open"])
+    with pytest.raises(ValueError, match=r"suite = 'clasic' .*allowed: classic, open, rail, all"):
+        find_suite("clasic")
 
 
 def test_several_policies_are_the_seeds_of_one_entry(tmp_path, monkeypatch, capsys):

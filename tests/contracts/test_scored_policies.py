@@ -18,7 +18,7 @@ from agents import SB3VecEnv
 from agents.foreign.onnx_export import TOLERANCE, export_archive
 from agents.foreign.policies import read_policy_file
 from agents.foreign.stable_baselines import algorithm_in
-from agents.policy.onnx_export import export_onnx
+from agents.policy.onnx_export import export_onnx, traced
 from agents.policy.seeds import load_policy
 from baselines.bench.evaluation import evaluate
 from birthsim_env.ids import rig_for
@@ -155,6 +155,59 @@ def test_an_archive_becomes_data_that_acts_as_it_does(kind, tmp_path):
     laws = [read_policy_file(str(one), rig_for(PROBE, None), 0.01) for one in (tmp_path / "model.zip", path)]
     one, other = (evaluate(PROBE, law, "", LANES, SEED, progress=False, **SHORT).traces[0] for law in laws)
     np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        (PPO, {"use_sde": True, "policy_kwargs": {"squash_output": True}}),
+        (SAC, {"use_sde": True, "buffer_size": 10}),
+        (RecurrentPPO, {"policy": "MlpLstmPolicy", "policy_kwargs": {"lstm_hidden_size": 8, "n_lstm_layers": 2}}),
+    ],
+)
+def test_an_archive_of_unusual_settings_becomes_data_too(kind, options, tmp_path):
+    kind(env=gym.make(PROBE), device="cpu", **{"policy": "MlpPolicy", **options}).save(tmp_path / "model.zip")
+    assert export_archive(tmp_path / "model.zip", tmp_path / "model.onnx").difference <= TOLERANCE
+
+
+class Named(gym.Env):
+    """Its observations have a name."""
+
+    observation_space = gym.spaces.Dict({"position": gym.spaces.Box(-1.0, 1.0, (2,))})
+    action_space = gym.spaces.Box(-1.0, 1.0, (4,))
+
+
+def test_an_archive_that_no_file_can_hold_is_refused_and_nothing_is_written(tmp_path):
+    PPO("MultiInputPolicy", Named(), device="cpu").save(tmp_path / "named.zip")
+    made(PPO).save(tmp_path / "model.zip")
+    with zipfile.ZipFile(tmp_path / "model.zip") as whole, zipfile.ZipFile(tmp_path / "untold.zip", "w") as untold:
+        for name in whole.namelist():
+            content = whole.read(name)
+            untold.writestr(name, content.replace(b"num_timesteps", b"other_number") if name == "data" else content)
+    for name, out, said in (
+        ("named.zip", "model.onnx", r"named\.zip' observes None .*allowed: lists of numbers"),
+        ("untold.zip", "model.onnx", r"untold\.zip': num_timesteps = None; allowed: a whole number"),
+        ("model.zip", "model.json", r"out = .*model\.json'; allowed: FILE\.onnx"),
+        ("model.zip", "", r"out = .*; allowed: FILE\.onnx"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            export_archive(tmp_path / name, tmp_path / "made" / out)
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_file_that_does_not_act_as_its_archive_is_not_written(tmp_path, monkeypatch):
+    def tampered(module, *given):
+        with torch.no_grad():
+            module.policy.action_net.bias.add_(1e-3)
+            model = traced(module, *given)
+            module.policy.action_net.bias.sub_(1e-3)
+        return model
+
+    made(PPO).save(tmp_path / "model.zip")
+    monkeypatch.setattr("agents.foreign.onnx_export.traced", tampered)
+    with pytest.raises(ValueError, match=r"model\.zip': actions differ in ONNX by 0\.001; allowed: 6e-05"):
+        export_archive(tmp_path / "model.zip", tmp_path / "deeper" / "model.onnx")
+    assert not (tmp_path / "deeper").exists()
 
 
 def test_data_of_an_archive_holds_its_normalisation(tmp_path, monkeypatch, capsys):

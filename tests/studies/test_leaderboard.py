@@ -6,13 +6,15 @@ import numpy as np
 import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
+from scipy.stats import gmean
 
 import birthsim
 from birthsim.benchmark.row import overall
 from birthsim.benchmark.scoring import judge, plan
 from birthsim.benchmark.suites import SUITES
 from lab.engine.shelf import DATA
-from lab.studies.leaderboard import entries, records, repeat
+from lab.studies.leaderboard import entries, records, repeat, who
+from lab.studies.leaderboard.gains import gains
 from lab.studies.leaderboard.seeds import seeds
 
 PID = entries.ENTRIES / "pid.json"
@@ -83,6 +85,33 @@ def test_each_seed_learns_a_rail_in_a_minute_to_three_tenths_of_a_millimetre(kno
         assert float(largest) == pytest.approx(max(own), rel=5e-3)
         assert float(median) < 0.3
         assert lost == "0 of 64"
+
+
+def test_a_gain_is_the_ratio_of_geometric_means_in_the_same_worlds(known):
+    rows = [line.strip("| ").split(" | ") for line in gains(known).splitlines()[2:]]
+    (own,) = [row for row in rows if row[:2] == ["`dystocia-lab`", "`honest_apg`"]]
+    assert own[2] == "`admittance-adaptive`"
+    one, its = (
+        next(row for row in known[name]["tasks"] if row["task"] == "dystocia-lab")
+        for name in ("honest_apg", "admittance-adaptive")
+    )
+    worlds = [k for k in range(64) if k not in one["infeasible"]]
+    assert one["lost"] == [0] * 5
+    means = [gmean([run[k] for k in worlds]) for run in (*one["errors"], *its["errors"])]
+    assert own[4] == ", ".join(f"{100 * (mean / means[-1] - 1):+.0f}" for mean in means[:-1])
+    whole, low, high = (float(word) for word in own[3].replace("[", "").replace("]", "").replace(",", "").split())
+    assert whole == pytest.approx(100 * (gmean(means[:-1]) / means[-1] - 1), abs=0.5)
+    assert low < whole < high
+
+
+def test_an_entry_of_files_says_what_it_senses_where_its_training_tells(known):
+    said = known["sac"]
+    assert who.facts(said) == ["default", "no", "yes"]
+    assert who.facts({**said, "training": [None] * 5}) == ["default", "-", "-"]
+    on_law = [{"settings": {"law": "admittance-adaptive"}, "steps": 1, "seconds": 1.0}] * 5
+    assert who.facts({**said, "training": on_law}) == ["default", "-", "-"]
+    blind = [{**one, "task": "circle-honest-no-force"} for one in said["tasks"]]
+    assert who.facts({**said, "tasks": blind}) == ["default", "no", "no"]
 
 
 def test_a_suite_has_a_score_only_where_all_its_tasks_are(known):

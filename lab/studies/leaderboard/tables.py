@@ -11,6 +11,7 @@ from lab.engine.worlds import worlds
 from lab.studies.leaderboard import who
 from lab.studies.leaderboard.cards import cards
 from lab.studies.leaderboard.entries import RULES
+from lab.studies.leaderboard.gains import gains
 from lab.studies.leaderboard.records import Known, every_entry, over_all, records, standings
 from lab.studies.leaderboard.seeds import seeds
 from lab.studies.leaderboard.to_beat import to_beat
@@ -43,6 +44,7 @@ def texts() -> dict[str, str]:
         "leaderboard-entries.md": _entries(known),
         "leaderboard-tasks.md": "\n\n".join(_task(task, known) for task in TASKS),
         "leaderboard-cards.md": cards(known),
+        "leaderboard-gains.md": gains(known),
         "rail_apg.md": seeds("rail-ideal", "rail_apg", ("admittance-adaptive", "pid", "abry", "backstepping"), known),
     }
     return {name: f"{text}\n" for name, text in own.items()} | {"leaderboard.csv": _data(known)}

@@ -2,7 +2,7 @@
 
 import re
 
-from birthsim.benchmark.suites import SUITES, BenchmarkTask
+from birthsim.benchmark.suites import BOTH, SUITES, BenchmarkTask, find_suite
 from birthsim_env.physics.compiled.sources import ROOT
 from lab.engine.tables import markdown
 from lab.studies.leaderboard import who
@@ -15,11 +15,11 @@ PAPERS = "backstepping"
 
 KINDS = {
     "ideal": "ideal sensors",
-    "lab": "`lab` sensors: late and noisy",
-    "honest": "`honest` sensors: biased and distorted too",
+    "lab": "`lab` sensors",
+    "honest": "`honest` sensors",
     "honest-no-force": "`honest`, no force sensor",
-    "honest-friction": "`honest`, unexpected friction",
-    "honest-wide": "`honest`, rigs far outside the training ranges",
+    "honest-friction": "`honest`, other friction",
+    "honest-wide": "`honest`, extreme rigs",
 }
 """A task's name without its scenario -> words, of the rig with two cylinders."""
 
@@ -42,8 +42,7 @@ def to_beat(known: Known) -> str:
 
 def _groups() -> dict[str, list[BenchmarkTask]]:
     """Words -> tasks of a row."""
-    two = [*SUITES["classic"], *SUITES["open"]]
-    kinds = {words: [task for task in two if task.name.partition("-")[2] == kind] for kind, words in KINDS.items()}
+    kinds = {words: [task for task in find_suite(BOTH) if task.name.partition("-")[2] == kind] for kind, words in KINDS.items()}
     return {**kinds, RAIL: list(SUITES["rail"])}
 
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from agents.residual.settings import NO_LAW
 from baselines.controller import RESIDUAL
 from birthsim.benchmark.contestant import ONNX, PLACES, in_task
 from birthsim.benchmark.suites import TASKS
@@ -23,8 +24,8 @@ def learned(said: dict[str, Any]) -> str:
         return "what reads its rig"
     if not is_learned(said):
         return "no"
-    law = settings(said).get("law", "none")
-    return "all of it" if law == "none" else f"a correction of `{law}`"
+    law = settings(said).get("law", NO_LAW)
+    return "all of it" if law == NO_LAW else f"a correction of `{law}`"
 
 
 def settings(said: dict[str, Any]) -> dict[str, Any]:
@@ -44,7 +45,8 @@ def facts(said: dict[str, Any]) -> list[str]:
     if name in names("policy"):
         name = f"{RESIDUAL}:{name}"
     rig, mass, force = information.informed_if_registered(name, *sensors)
-    if set(said["kinds"]) == {ONNX}:  # it has observations alone
+    own = settings(said)
+    if set(said["kinds"]) == {ONNX} and own and own.get("law", NO_LAW) == NO_LAW:  # it has observations alone
         mass, force = "no", "yes" if any(TASKS[one["task"]].force_sensor for one in said["tasks"]) else "no"
     return ["finds it out" if READS in given or FINDS in given else rig, mass, force]
 
