@@ -5,9 +5,9 @@ which it takes for noise; stiffer ones hold it and then let go. Here every pisto
 (``bristle_filter``, ``maxwell_filter``), each with a friction of its own and with an unknown force f, the errors of mass,
 pressures and levels:
     m a = L + Fu + f - friction(v, z),   f' = noise
-Samples correct each filter, and their innovations say how probable it is (``friction_candidates.likelihood``). Position, speed
-and all that is unseen, f less friction, are the means of what the filters say. A piston rests, creeps or slides as its
-candidates do; nothing else tells a rest, and no friction is fed forward.
+Samples correct each filter, by where it believes the piston was when they were taken, and their innovations say how probable
+it is (``friction_candidates.likelihood``). Position, speed and all that is unseen, f less friction, are the means of what the
+filters say. A piston rests, creeps or slides as its candidates do; nothing else tells a rest, and no friction is fed forward.
 
 While the target moves, friction along its way is known before it acts, and an observer that is given it (``observers``) errs
 less than these candidates, which learn it from samples. So the law follows them while its target rests alone.
@@ -90,6 +90,7 @@ def _follow(
     level: float,
     is_sampled: bool,
     sample: float,
+    age: float,
     noise: float,
     start: tuple[float, float],
     p: Rig,
@@ -99,8 +100,8 @@ def _follow(
     """Carries piston ``k`` of lane ``i`` on by a period: its position, m, speed, m/s, and what is unseen, N.
 
     ``told`` are the force, N, and the acceleration without any, m/s2, that act on the piston, the answer to a force, 1/kg, and
-    its viscous friction, N s/m; ``level`` is Coulomb friction, N; ``sample`` was carried on to now, with its ``noise``, m; a
-    ``new`` lane starts at the position and speed of ``start``.
+    its viscous friction, N s/m; ``level`` is Coulomb friction, N; ``sample`` was taken an ``age``, s, ago, with its ``noise``,
+    m; a ``new`` lane starts at the position and speed of ``start``.
     """
     (load, own, answer, viscous), weighs, count = told, bank.since[i] > WAITS, len(BRISTLES)
     total, position, speed, unseen, off = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -110,15 +111,15 @@ def _follow(
         if new:
             bristle_filter.begin(b, k, i, start[0], start[1], -load - own / answer, noise, law, p)
             maxwell_filter.begin(b, k, i, law, p)
-        boost = bank.sums.boost[k, i]
+        boost, before = bank.sums.boost[k, i], b.speed[k, i]
         if c == MAXWELL:
             maxwell_filter.predict(b, k, i, load, own, answer, density, boost, law, p, period)
         else:
             bristle_filter.predict(b, k, i, load, own, answer, density, boost, UNSEEN, law, p, period)
         chance = b.chance[k, i] + (period / CHANGES * (1.0 / count - b.chance[k, i]) if weighs else 0.0)
         if is_sampled:
-            innovation = sample - b.position[k, i]
-            variance = bristle_filter.correct(b, k, i, innovation, noise)
+            innovation = sample - bristle_filter.position_ago(b, k, i, (b.speed[k, i] - before) / period, age)
+            variance = bristle_filter.correct(b, k, i, innovation, noise, age, answer)
             chance *= likelihood(innovation, variance, POWER) if weighs else 1.0
             off += chance * innovation / math.sqrt(variance)
         b.chance[k, i] = chance
@@ -178,6 +179,6 @@ def observe(
             told = (load1, own1, answer, p.fv1) if k == 0 else (load2, own2, answer, p.fv2)
             level = levels[k, i] * dry_friction.level_at(k, air.rows, i, p)
             noise = inputs.noise[i] / lever + LATE * abs(v)
-            where, start = sample.position[k, i] + v * age, (joints.position[k, i], v)
-            position, speed, left = _follow(bank, k, i, told, level, is_sampled, where, noise, start, p, period, new)
+            where, start = sample.position[k, i], (joints.position[k, i], v)
+            position, speed, left = _follow(bank, k, i, told, level, is_sampled, where, age, noise, start, p, period, new)
             found.position[k, i], found.speed[k, i], found.unseen[k, i] = position, speed, left

@@ -158,3 +158,44 @@ def test_a_force_and_a_speed_correct_as_a_kalman_filter_asks_for(speed):
         state, covariance = read(b)
         np.testing.assert_allclose(state, start + gain * off)
         np.testing.assert_allclose(covariance, np.triu(before - np.outer(gain, h @ before)), rtol=1e-6, atol=1e-15)
+
+
+def test_a_late_sample_corrects_as_a_kalman_filter_asks_for():
+    """h = (1, -age, 0, 0) of the position an age ago, which constant acceleration leaves exact; the force adds to the noise."""
+    rng, age, acceleration = np.random.default_rng(6), 0.012, -2.5
+    root = rng.standard_normal((4, 4)) * np.array([1e-4, 1e-2, 3e-5, 2.0])[:, None]
+    before, start = root @ root.T, np.array([0.01, 0.03, 1e-4, 5.0])
+    b, h = believed(start, before), np.array([1.0, -age, 0.0, 0.0])
+    ago = bristle_filter.position_ago(b, 1, 0, acceleration, age)
+    assert ago == pytest.approx(np.polynomial.Polynomial([start[0], start[1], acceleration / 2])(-age), abs=1e-15)
+    variance = bristle_filter.correct(b, 1, 0, 3e-4, NOISE, age, 1.0 / MASS)
+    # The way that a force f goes in an age: f/m age^2/2.
+    expected = h @ before @ h + NOISE**2 + before[3, 3] * (age**2 / 2 / MASS) ** 2
+    assert variance == pytest.approx(expected, rel=1e-12)
+    gain = before @ h / expected
+    state, covariance = read(b)
+    np.testing.assert_allclose(state, start + gain * 3e-4, rtol=1e-12)
+    scale, upper = np.sqrt(np.diag(before)), np.triu_indices(4)
+    after = (before - np.outer(gain, h @ before)) / np.outer(scale, scale)
+    np.testing.assert_allclose((covariance / np.outer(scale, scale))[upper], after[upper], atol=1e-12)
+
+
+@pytest.mark.parametrize(("late", "push_noise"), [(4, 1.0), (4, 30.0), (4, 300.0), (8, 1.0), (8, 30.0), (8, 300.0), (15, 1.0)])
+def test_samples_that_are_late_do_not_make_the_filter_swing(late, push_noise):
+    """A force that it does not know swings the piston at 4 Hz. Where samples were carried on by the filter's own speed and
+    taken for samples of now, it diverged from 8 ms on at any noise of the force, and at 4 ms from 30 N2/s on. (With 30 N2/s
+    and 15 ms the speed is still off by twice its size: so late a sample tells little of so quick a force.)"""
+    time, rng = np.arange(3000) * PERIOD, np.random.default_rng(7)
+    path, age = piston(time, lambda t: 45.0 * np.sin(8 * np.pi * t)), late * PERIOD
+    b, speed = filter_of(COULOMB), np.empty(len(time))
+    bristle_filter.begin(b, 1, 0, path[0], 0.0, 0.0, NOISE, LUGRE, P)
+    for k in range(len(time)):
+        before = b.speed[1, 0]
+        bristle_filter.predict(b, 1, 0, 0.0, 0.0, 1.0 / MASS, push_noise, 0.0, 0.0, LUGRE, P, PERIOD)
+        if k % 4 == 0 and k >= late:
+            ago = bristle_filter.position_ago(b, 1, 0, (b.speed[1, 0] - before) / PERIOD, age)
+            off = path[k - late] + NOISE * rng.standard_normal() - ago
+            bristle_filter.correct(b, 1, 0, off, NOISE, age, 1.0 / MASS)
+        speed[k] = b.speed[1, 0]
+    # No more than a few times the speed that 45 N give the head in a quarter of a swing; one that diverges goes beyond any.
+    assert np.abs(speed).max() < 4 * 45.0 / MASS / (8 * np.pi)

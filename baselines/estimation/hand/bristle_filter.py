@@ -232,14 +232,28 @@ def _take(b: Bristled, k: int, i: int, y: float, v: float, z: float, f: float, v
 
 
 @helper
-def correct(b: Bristled, k: int, i: int, innovation: float, noise: float) -> float:
+def correct(b: Bristled, k: int, i: int, innovation: float, noise: float, age: float = 0.0, answer: float = 0.0) -> float:
     """Takes a position sample of piston ``k`` of lane ``i``: what it is off, m, and its standard deviation, m; the variance of
-    the innovation, m2."""
-    yy, yv, yz, yf = b.yy[k, i], b.yv[k, i], b.yz[k, i], b.yf[k, i]
-    found = _take(b, k, i, yy, yv, yz, yf, yy + noise * noise, innovation)
+    the innovation, m2.
+
+    ``innovation`` is that from ``position_ago`` of the same ``age``, s, of a sample that is late. What such a sample is off is
+    an error of the position less an ``age`` times that of the speed, and noise that f, by the ``answer`` to it, 1/kg, leaves of
+    the way since. As a sample of now it would be answered too much, and the filter would swing. An ``age`` of 0 stands for a
+    sample of now, or one carried on with a speed that is not this filter's.
+    """
+    yy, yv, yz = b.yy[k, i] - age * b.yv[k, i], b.yv[k, i] - age * b.vv[k, i], b.yz[k, i] - age * b.vz[k, i]
+    unsure = 0.5 * age * age * answer
+    variance: float = yy - age * yv + noise * noise + unsure * unsure * b.ff[k, i]
+    found = _take(b, k, i, yy, yv, yz, b.yf[k, i] - age * b.vf[k, i], variance, innovation)
     b.surprise[k, i] += SHARE * (found - b.surprise[k, i])
-    variance: float = yy + noise * noise
     return variance
+
+
+@helper
+def position_ago(b: Bristled, k: int, i: int, acceleration: float, age: float) -> float:
+    """Where piston ``k`` of lane ``i`` was an ``age``, s, ago, m, if its ``acceleration``, m/s2, has been the same since."""
+    there: float = b.position[k, i] - age * (b.speed[k, i] - 0.5 * age * acceleration)
+    return there
 
 
 @helper
