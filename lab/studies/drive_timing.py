@@ -1,6 +1,7 @@
 """How punctual ``birthsim drive`` is against a simulated rig in another process: quiet, beside busy processes, with and
-without a priority."""
+without a priority; and how punctual a loop of this machine is that does nothing but wait for its periods."""
 
+import multiprocessing
 import subprocess
 import sys
 import tempfile
@@ -10,7 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from baselines.work.tasks import Result, Task
+from birthsim_drive.loop.realtime import prepare
+from birthsim_drive.pace import Pace
 from birthsim_drive.safety.limits import Limits
 from birthsim_drive.session import Drive, perform
 from birthsim_drive.simulated import Simulated
@@ -22,11 +27,17 @@ from lab.engine.tables import Cell, Head, markdown
 
 ENVIRONMENT, CONTROLLER, SENSORS = "BirthSIM/Probe-v3", "admittance-adaptive", "lab"
 
+FLOOR = {"quiet": 0, "beside busy processes": 1}
+"""Name -> whether others are busy, of the loop without work, which has the priority."""
+
+FIRST, PERIOD = 50, 1e-3
+"""The priority, and the period in s, of the loop without work: those of a drive."""
+
 CONDITIONS = {
     "quiet, no priority": (0, 0),
-    "quiet, SCHED_FIFO": (0, 50),
+    "quiet, SCHED_FIFO": (0, FIRST),
     "beside busy processes, no priority": (1, 0),
-    "beside busy processes, SCHED_FIFO": (1, 50),
+    "beside busy processes, SCHED_FIFO": (1, FIRST),
 }
 """Name -> whether others are busy, and the priority of the loop and of the simulated rig."""
 
@@ -64,25 +75,57 @@ def measure(others: int, priority: int, seconds: float) -> Result:
     return {**kept, **shares, "stalls": stalls, "granted": outcome.granted, "faults": [one.kind for one in outcome.faults]}
 
 
+def waited(priority: int, seconds: float) -> list[float]:
+    """How late each period of a loop without any work began, s, in this process, which it makes punctual."""
+    prepare(priority)
+    pace, late, ticks = Pace(PERIOD), [], round(seconds / PERIOD)
+    begun = time.perf_counter() - pace.wait() * PERIOD
+    for _ in range(ticks):
+        tick = pace.wait()
+        late.append(time.perf_counter() - begun - tick * PERIOD)
+    return late
+
+
+def measure_waiting(others: int, priority: int, seconds: float) -> Result:
+    """The same, in a process of its own."""
+    with busy(others), multiprocessing.get_context("spawn").Pool(1) as alone:
+        late = np.asarray(alone.apply(waited, (priority, seconds)))
+    return {
+        "periods": len(late),
+        "late": int(np.sum(late > PERIOD)),
+        "lateness": {"99.9 %": float(np.quantile(late, 0.999)), "largest": float(late.max())},
+    }
+
+
 PARTS = ("periods", "jitter", "computing")
 STATISTICS = ("median", "99.9 %", "largest")
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
-    return {
+    drives = {
         name: Task(
             f"drive-{k}", measure, {"others": options.others * is_busy, "priority": priority, "seconds": options.seconds}
         )
         for k, (name, (is_busy, priority)) in enumerate(CONDITIONS.items())
     }
+    floors = {
+        name: Task(
+            f"floor-{k}", measure_waiting, {"others": options.others * is_busy, "priority": FIRST, "seconds": options.seconds}
+        )
+        for k, (name, is_busy) in enumerate(FLOOR.items())
+    }
+    return {**drives, **floors}
 
 
 def _kept(options: Options, found: Found) -> Any:
-    return [{"condition": name, **result} for name, result in found.items()]
+    kept: dict[str, list[Any]] = {"drives": [], "floor": []}
+    for name, result in found.items():
+        kept["floor" if name in FLOOR else "drives"].append({"condition": name, **result})
+    return kept
 
 
 def _shown(content: Content) -> dict[str, str]:
-    settings, figures = content["settings"], content["figures"]
+    settings, figures, floor = content["settings"], content["figures"]["drives"], content["figures"]["floor"]
     head = ["condition", "samples", "late", "missed by the rig", "stalls of the rig"]
     lines: list[list[Cell | Head]] = [[*head, *(Head(f"{name}, us", STATISTICS) for name in PARTS)]]
     for one in figures:
@@ -105,14 +148,21 @@ def _shown(content: Content) -> dict[str, str]:
         "arrivals differs from that of the rig's clock. A simulated rig that is late itself by 5 periods *stalls*. "
         f"Loop: {figures[-1]['granted']}."
     )
-    return {"drive-timing.md": f"{said}\n\n{markdown(lines)}\n"}
+    alone: list[list[Cell | Head]] = [["condition", "periods", "late", Head("lateness, us", ("99.9 %", "largest"))]]
+    for one in floor:
+        late = [f"{1e6 * one['lateness'][part]:,.0f}" for part in ("99.9 %", "largest")]
+        alone.append([one["condition"], str(one["periods"]), str(one["late"]), late])
+    machine = (
+        f"What the machine itself is late by: a loop with SCHED_FIFO {FIRST} that does nothing but wait for each millisecond."
+    )
+    return {"drive-timing.md": f"{said}\n\n{markdown(lines)}\n\n{machine}\n\n{markdown(alone)}\n"}
 
 
 STUDY = Study(
     {"seconds": 20.0, "others": 4},
     _tasks,
     _kept,
-    {"periods": "s", "jitter": "s", "computing": "s"},
+    {"periods": "s", "jitter": "s", "computing": "s", "lateness": "s"},
     _shown,
     words={"seconds": "of each drive", "others": "processes that are busy"},
     timed=True,

@@ -35,7 +35,8 @@ def port(answers, mass=3.0):
 @pytest.mark.parametrize("mass", [4.5, 5.5])
 def test_a_stiff_hand_is_shaken_by_a_quarter_of_what_a_loop_does_that_does_not_feel_it(mass):
     shaken, calm = (hold(*port(answers, mass)[:2])["force"] for answers in (False, True))
-    assert shaken.max() > 20.0
+    # There must be something to calm: several times the 5 N that a calm hand may feel.
+    assert shaken.max() > 15.0
     assert calm.max() < 5.0
     assert (calm < 0.25 * shaken.max()).all()
 
