@@ -6,6 +6,7 @@ import shutil
 import sys
 from pathlib import Path
 
+from markupsafe import Markup, escape
 from sphinx.addnodes import download_reference
 
 HERE = Path(__file__).resolve().parent
@@ -100,7 +101,9 @@ def with_card(app, page, template, context, doctree):
     body = context.get("body", "")
     context["body"] = body.replace("<img ", '<img loading="lazy" ')
     address = html_baseurl or "../" * page.count("/")
-    title = project if page == "index" else f"{context.get('title')} · {project}"
+    # A title may hold code and mathematics, whose tags would end the attribute.
+    plain = escape(Markup(context.get("title", "")).striptags())
+    title = project if page == "index" else f"{plain} · {project}"
     context["metatags"] = (
         context.get("metatags", "")
         + f"""
