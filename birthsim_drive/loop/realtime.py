@@ -1,8 +1,10 @@
-"""What a process may do to be on time: no garbage collection, locked memory, a priority before others."""
+"""What a process may do to be on time: no garbage collection, locked memory, a priority before others, processors that stay
+awake."""
 
 import ctypes
 import gc
 import os
+import sys
 from dataclasses import dataclass
 
 MEMORY = 3
@@ -12,6 +14,10 @@ PRIORITY = 50
 """Of SCHED_FIFO, 1 to 99; assumed: above other programs, below what a kernel for real time gives its interrupts."""
 
 
+LATENCY = "/dev/cpu_dma_latency"
+"""Where Linux is told how late a processor may wake, us in 32 bits, for as long as the file is open (its PM QoS interface)."""
+
+
 @dataclass(frozen=True)
 class Granted:
     """What the system has granted."""
@@ -19,6 +25,8 @@ class Granted:
     memory_locked: bool
     priority: int
     """Of SCHED_FIFO; 0 where it was refused or not asked for."""
+    awake: bool
+    """Whether idle processors poll instead of sleeping; a virtual one that sleeps may be taken away for milliseconds."""
     kernel: str
     """The system's own words of its kernel; PREEMPT_RT is one for real time."""
 
@@ -26,7 +34,8 @@ class Granted:
         """In a line."""
         locked = "memory locked" if self.memory_locked else "memory not locked"
         first = f"SCHED_FIFO {self.priority}" if self.priority else "no priority"
-        return f"{locked}, {first}, kernel {self.kernel}"
+        awake = "idle processors kept awake" if self.awake else "idle processors asleep"
+        return f"{locked}, {first}, {awake}, kernel {self.kernel}"
 
 
 def prepare(priority: int) -> Granted:
@@ -34,7 +43,7 @@ def prepare(priority: int) -> Granted:
     gc.collect()
     gc.freeze()
     gc.disable()
-    return Granted(_lock_memory(), _raise_priority(priority), _kernel())
+    return Granted(_lock_memory(), _raise_priority(priority), priority > 0 and _stay_awake(), _kernel())
 
 
 def _lock_memory() -> bool:
@@ -52,6 +61,16 @@ def _raise_priority(priority: int) -> int:
     except OSError:
         return 0
     return priority
+
+
+def _stay_awake() -> bool:
+    """Until this process ends, which closes the file."""
+    try:
+        told = os.open(LATENCY, os.O_WRONLY)
+        os.write(told, (0).to_bytes(4, sys.byteorder))
+    except OSError:  # another system, or no permission
+        return False
+    return True
 
 
 def _kernel() -> str:
