@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from baselines.work.tasks import Result, Task
-from birthsim_drive.loop.realtime import prepare
+from birthsim_drive.loop.realtime import PRIORITY, prepare
 from birthsim_drive.pace import Pace
 from birthsim_drive.safety.limits import Limits
 from birthsim_drive.session import Drive, perform
@@ -30,14 +30,14 @@ ENVIRONMENT, CONTROLLER, SENSORS = "BirthSIM/Probe-v3", "admittance-adaptive", "
 FLOOR = {"quiet": 0, "beside busy processes": 1}
 """Name -> whether others are busy, of the loop without work, which has the priority."""
 
-FIRST, PERIOD = 50, 1e-3
-"""The priority, and the period in s, of the loop without work: those of a drive."""
+PERIOD = 1e-3
+"""s, of the loop without work: that of a drive."""
 
 CONDITIONS = {
     "quiet, no priority": (0, 0),
-    "quiet, SCHED_FIFO": (0, FIRST),
+    "quiet, SCHED_FIFO": (0, PRIORITY),
     "beside busy processes, no priority": (1, 0),
-    "beside busy processes, SCHED_FIFO": (1, FIRST),
+    "beside busy processes, SCHED_FIFO": (1, PRIORITY),
 }
 """Name -> whether others are busy, and the priority of the loop and of the simulated rig."""
 
@@ -75,9 +75,9 @@ def measure(others: int, priority: int, seconds: float) -> Result:
     return {**kept, **shares, "stalls": stalls, "granted": outcome.granted, "faults": [one.kind for one in outcome.faults]}
 
 
-def waited(priority: int, seconds: float) -> list[float]:
+def waited(seconds: float) -> list[float]:
     """How late each period of a loop without any work began, s, in this process, which it makes punctual."""
-    prepare(priority)
+    prepare(PRIORITY)
     pace, late, ticks = Pace(PERIOD), [], round(seconds / PERIOD)
     begun = time.perf_counter() - pace.wait() * PERIOD
     for _ in range(ticks):
@@ -86,10 +86,10 @@ def waited(priority: int, seconds: float) -> list[float]:
     return late
 
 
-def measure_waiting(others: int, priority: int, seconds: float) -> Result:
+def measure_waiting(others: int, seconds: float) -> Result:
     """The same, in a process of its own."""
     with busy(others), multiprocessing.get_context("spawn").Pool(1) as alone:
-        late = np.asarray(alone.apply(waited, (priority, seconds)))
+        late = np.asarray(alone.apply(waited, (seconds,)))
     return {
         "periods": len(late),
         "late": int(np.sum(late > PERIOD)),
@@ -109,9 +109,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
         for k, (name, (is_busy, priority)) in enumerate(CONDITIONS.items())
     }
     floors = {
-        name: Task(
-            f"floor-{k}", measure_waiting, {"others": options.others * is_busy, "priority": FIRST, "seconds": options.seconds}
-        )
+        name: Task(f"floor-{k}", measure_waiting, {"others": options.others * is_busy, "seconds": options.seconds})
         for k, (name, is_busy) in enumerate(FLOOR.items())
     }
     return {**drives, **floors}
@@ -153,7 +151,7 @@ def _shown(content: Content) -> dict[str, str]:
         late = [f"{1e6 * one['lateness'][part]:,.0f}" for part in ("99.9 %", "largest")]
         alone.append([one["condition"], str(one["periods"]), str(one["late"]), late])
     machine = (
-        f"What the machine itself is late by: a loop with SCHED_FIFO {FIRST} that does nothing but wait for each millisecond."
+        f"How late the machine itself is: a loop with SCHED_FIFO {PRIORITY} that does nothing but wait for each millisecond."
     )
     return {"drive-timing.md": f"{said}\n\n{markdown(lines)}\n\n{machine}\n\n{markdown(alone)}\n"}
 
