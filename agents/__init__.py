@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
     from agents.training.sb3.adapter import SB3VecEnv
-    from agents.training.sb3.shifted_reward import ShiftedReward
     from agents.training.trainer import train
 
 BELONGS_TO_BIRTHSIM = True
@@ -27,7 +26,6 @@ _PLACES = {
     "ResidualController": "policy.controller",
     "ResidualSettings": "residual.settings",
     "SB3VecEnv": "training.sb3.adapter",
-    "ShiftedReward": "training.sb3.shifted_reward",
     "TrainingSettings": "training.configuration",
     "export_onnx": "policy.onnx_export",
     "load_policy": "policy.seeds",
@@ -37,7 +35,7 @@ _PLACES = {
 """Public name -> where it lives; it is imported, and PyTorch with it where that is needed, when it is first used."""
 
 __all__ = [
-    "Policy", "ResidualController", "ResidualSettings", "SB3VecEnv", "ShiftedReward", "TrainingSettings", "export_onnx",
+    "Policy", "ResidualController", "ResidualSettings", "SB3VecEnv", "TrainingSettings", "export_onnx",
     "load_policy", "save_policy", "train",
 ]  # fmt: skip
 

@@ -9,7 +9,6 @@ import pytest
 from agents.gradients.rollouts import Worlds
 from agents.residual.settings import LAWS, ResidualSettings, needs_force
 from agents.training.sb3.adapter import SB3VecEnv
-from agents.training.sb3.shifted_reward import ShiftedReward
 from baselines import BacksteppingController, make_controller
 from baselines.controller import checked_command
 from baselines.identification.experiment import propose
@@ -111,7 +110,6 @@ TABLE = {
     ("controller = 'nobody'", "backstepping, "): [lambda: make_controller("nobody[gain=3]", RIG)],
     ("controller = 'none'", "backstepping, "): [lambda: make_controller("limited:none", RIG)],
     ("duration = ", ">= 4 and <= 600 (s)"): [later(propose, RIG)(value) for value in (0.0, 3.9, 601.0, NAN)],
-    ("discount = ", "0 or more and less than 1"): [later(ShiftedReward, None, 1.0)(value) for value in (-0.1, 1.0, 2.0, NAN)],
     ("informed = 'yes'", "True, False"): [residual(informed="yes")],
     ("env = ", "one made with autoreset_mode='SameStep'"): [
         *(lambda wrapped=wrapped: wrapped(gymnasium.make_vec(CIRCLE, num_envs=2)) for wrapped in (SB3VecEnv, Worlds)),

@@ -9,7 +9,6 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.files import FORMAT, WEIGHTS, read_policy
 from agents.policy.sealed import sealed, unsealed
@@ -65,24 +64,24 @@ def test_a_policy_without_and_with_a_memory(name, data):
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
-    """A model, its environment, and their checkpoint's file; as it is, it is read."""
+    """A model and its checkpoint's file; as it is, it is read."""
     torch.set_num_threads(1)
     folder = tmp_path_factory.mktemp("checkpoint")
-    env = VecNormalize(SB3VecEnv(gymnasium.make_vec(TINY.environment, num_envs=2, autoreset_mode="SameStep")))
+    env = SB3VecEnv(gymnasium.make_vec(TINY.environment, num_envs=2, autoreset_mode="SameStep"))
     env.seed(0)
     env.reset()
     model = make_model(algorithm_of(TINY.algorithm), TINY, env)
     model.learn(64)
-    save_checkpoint(folder, model, env, SETTINGS, PAST)
-    load_checkpoint(folder, model, env, SETTINGS)
-    return model, env, (folder / checkpoint.NAME).read_bytes()
+    save_checkpoint(folder, model, SETTINGS, PAST)
+    load_checkpoint(folder, model, SETTINGS)
+    return model, (folder / checkpoint.NAME).read_bytes()
 
 
 @cases
 @given(data=st.data())
 def test_a_checkpoint(data, trained):
-    model, env, valid = trained
+    model, valid = trained
     content = data.draw(odd_seals(valid, checkpoint.FORMAT))
     with watched(checkpoint.NAME) as case:
         (case.folder / checkpoint.NAME).write_bytes(content)
-        assert isinstance(load_checkpoint(case.folder, model, env, SETTINGS), dict)
+        assert isinstance(load_checkpoint(case.folder, model, SETTINGS), dict)

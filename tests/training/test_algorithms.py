@@ -8,7 +8,6 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, read_policy, save_policy
@@ -27,20 +26,20 @@ MEMORY = replace(TINY, algorithm="recurrent-ppo", memory=12)
 
 
 def made(settings, residual=VARIABLE, **arguments):
-    """A new model, its normalised environment and the native one below it."""
+    """A new model and the native environment below its own."""
     torch.set_num_threads(1)
     native = gymnasium.make_vec(CIRCLE, num_envs=settings.lanes, autoreset_mode="SameStep", **residual.to_dict(), **arguments)
-    env = VecNormalize(SB3VecEnv(native), gamma=settings.discount)
-    return make_model(algorithm_of(settings.algorithm), settings, env), env, native
+    return make_model(algorithm_of(settings.algorithm), settings, SB3VecEnv(native)), native
 
 
 def observations(native, size, steps=40, seed=77):
-    """What policies see, (N, D), on the way under random actions; and things that they never see."""
+    """What policies see, (N, D), on the way under random actions; and what they hardly ever see, within the bounds."""
     rng = np.random.default_rng(0)
     seen = [native.reset(seed=seed)[0]]
     seen += [native.step(rng.uniform(-1, 1, (native.num_envs, size)).astype(np.float32))[0] for _ in range(steps)]
     rows = np.concatenate(seen)
-    return rows, rng.normal(size=rows.shape, scale=5).astype(np.float32)
+    bounds = native.single_observation_space
+    return rows, np.clip(rng.normal(size=rows.shape, scale=5).astype(np.float32), bounds.low, bounds.high)
 
 
 def rounding(network, inputs):
@@ -62,35 +61,34 @@ def rounding(network, inputs):
 
 @pytest.mark.parametrize("algorithm", FEEDFORWARD)
 def test_before_it_has_learned_a_policy_says_nothing_and_explores_around_that(algorithm):
-    model, env, native = made(replace(TINY, algorithm=algorithm, log_std=-1.0), randomize=True)
+    model, native = made(replace(TINY, algorithm=algorithm, log_std=-1.0), randomize=True)
     rows, far = observations(native, 5)
     for inputs in (rows, far):
-        np.testing.assert_array_equal(network_of(model.algorithm, model.policy, env).actions(inputs), 0)
-        np.testing.assert_array_equal(model.predict(env.normalize_obs(inputs), deterministic=True)[0], 0)
-    tried = model.predict(env.normalize_obs(rows), deterministic=False)[0]
+        np.testing.assert_array_equal(network_of(model.algorithm, model.policy).actions(inputs), 0)
+        np.testing.assert_array_equal(model.predict(inputs, deterministic=True)[0], 0)
+    tried = model.predict(rows, deterministic=False)[0]
     expected = np.tanh(np.exp(-1) * np.random.default_rng(0).normal(size=100_000)).std() if algorithm != "ppo" else np.exp(-1)
     assert tried.std() == pytest.approx(expected, rel=0.1)
     assert abs(tried.mean()) < 0.05
     # The layers below the last one are random: there is something to learn with.
-    assert all(weight.any() for weight, _ in network_of(model.algorithm, model.policy, env).layers[:-1])
+    assert all(weight.any() for weight, _ in network_of(model.algorithm, model.policy).layers[:-1])
 
 
 @pytest.mark.parametrize("algorithm", FEEDFORWARD)
 @pytest.mark.parametrize("hidden", [(16, 16), (8,), (5, 6, 7)])
 def test_the_network_taken_from_a_model_does_what_the_model_predicts(algorithm, hidden):
-    # Without randomisation some inputs never change: their variance is almost nothing, and rounding weighs most.
-    model, env, native = made(replace(TINY, algorithm=algorithm, hidden=hidden), randomize=hidden != (8,))
+    model, native = made(replace(TINY, algorithm=algorithm, hidden=hidden), randomize=hidden != (8,))
     model.learn(300)
     last = model.policy.action_net if algorithm == "ppo" else model.policy.actor.mu
     with torch.no_grad():
         # As a trained network: actions over most of [-1, 1].
         last.weight.mul_(0.5 / last.weight.norm(dim=1).max())
-    taken = network_of(model.algorithm, model.policy, env)
+    taken = network_of(model.algorithm, model.policy)
     assert taken.squashed == (algorithm != "ppo")
     assert len(taken.layers) == len(hidden) + 1
     rows, far = observations(native, 5)
     for inputs in (rows, far):
-        expected, _ = model.predict(env.normalize_obs(inputs), deterministic=True)
+        expected, _ = model.predict(inputs, deterministic=True)
         actions = taken.actions(inputs)
         assert (np.abs(actions - expected) <= rounding(taken, inputs)).all()
         assert len(np.unique(actions.round(3), axis=0)) > 20
@@ -100,7 +98,7 @@ def test_the_network_taken_from_a_model_does_what_the_model_predicts(algorithm, 
 @pytest.mark.parametrize("algorithm", FEEDFORWARD)
 def test_settings_reach_the_algorithm(algorithm):
     settings = replace(TINY, algorithm=algorithm, discount=0.9, learning_rate=2e-3, seed=5)
-    model, _, _ = made(settings)
+    model, _ = made(settings)
     assert (model.gamma, model.batch_size, model.seed, str(model.device)) == (0.9, 64, 5, "cpu")
     np.testing.assert_allclose([model.lr_schedule(left) for left in (1.0, 0.5, 0.0)], [2e-3, 1.01e-3, 2e-5])
     if algorithm == "ppo":
@@ -122,18 +120,18 @@ def sequences(native, size, steps=30):
 
 
 def test_a_recurrent_network_remembers_and_forgets_as_the_model_does():
-    model, env, native = made(MEMORY, randomize=True)
+    model, native = made(MEMORY, randomize=True)
     seen, begins = sequences(native, 5)
-    np.testing.assert_array_equal(network_of(model.algorithm, model.policy, env).actions(seen[0]), 0)
+    np.testing.assert_array_equal(network_of(model.algorithm, model.policy).actions(seen[0]), 0)
     model.learn(300)
     with torch.no_grad():
         last = model.policy.action_net
         last.weight.mul_(0.5 / last.weight.norm(dim=1).max())
-    taken = network_of(model.algorithm, model.policy, env)
+    taken = network_of(model.algorithm, model.policy)
     assert (taken.cells, len(taken.layers), taken.squashed) == (12, 3, False)
     acts, state, without = taken.acting(), None, []
     for rows, begun in zip(seen, begins, strict=True):
-        expected, state = model.predict(env.normalize_obs(rows), state, begun, deterministic=True)
+        expected, state = model.predict(rows, state, begun, deterministic=True)
         acts.reset(begun)
         actions = acts(rows)
         # Thirty steps of sums over 44 numbers in singles, of which a gate hands on less than it got.
@@ -145,11 +143,11 @@ def test_a_recurrent_network_remembers_and_forgets_as_the_model_does():
 def test_a_recurrent_policy_is_a_folder_like_any_other_and_runs_compiled_in_a_controller(tmp_path):
     """One period at a time in Python, its network asked at every tenth, and compiled: the same bits; and it is exported."""
     residual = ResidualSettings("backstepping-force-first")
-    model, env, _ = made(MEMORY, residual, randomize=True)
+    model, _ = made(MEMORY, residual, randomize=True)
     model.learn(300)
     with torch.no_grad():
         model.policy.action_net.weight.mul_(0.5 / model.policy.action_net.weight.norm(dim=1).max())
-    trained = Policy(network_of(model.algorithm, model.policy, env), CIRCLE, residual, {})
+    trained = Policy(network_of(model.algorithm, model.policy), CIRCLE, residual, {})
     save_policy(trained, tmp_path)
     compiled = ResidualController(None, tmp_path)
     function = ResidualController(None, read_policy(tmp_path).network.acting(), residual)
@@ -162,7 +160,7 @@ def test_a_recurrent_policy_is_a_folder_like_any_other_and_runs_compiled_in_a_co
 
 def test_sequences_that_begin_midway_are_learned_from_as_they_were_collected():
     """The buffer cuts what was collected where episodes begin: the policy then says again what it said step by step."""
-    model, _, native = made(replace(MEMORY, lanes=3, rollout=64, batch=77), duration=0.3)
+    model, native = made(replace(MEMORY, lanes=3, rollout=64, batch=77), duration=0.3)
     model.learn(64 * 3 * 2)
     assert native.steps < 64, "episodes begin inside a rollout"
     buffer, compared = model.rollout_buffer, 0

@@ -95,7 +95,7 @@ def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
         "learning_rate": f"lin_{training.learning_rate:g}",
     }  # fmt: skip
     assert {key: zoo[key] for key in numbers} == numbers
-    assert zoo["normalize"] is True
+    assert "normalize" not in zoo, "as here: neither observations nor rewards"
     layers = list(training.hidden)
     policy = eval(zoo["policy_kwargs"], {"nn": torch.nn, "dict": dict})  # as RL-Zoo reads it
     assert policy == {

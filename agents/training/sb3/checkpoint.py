@@ -1,4 +1,4 @@
-"""Checkpoints of a training by Stable-Baselines3: weights, statistics, lanes, what is remembered or logged, random states."""
+"""Checkpoints of a training by Stable-Baselines3: weights, lanes, what is remembered or logged, random states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.training.checkpoint import read_checkpoint, require_array, require_moments, tensors, write_checkpoint
 from agents.training.sb3.adapter import SB3VecEnv
@@ -22,22 +21,19 @@ FREE = ("past", "state", "lanes", "memory", "last", "random", "logged", "episode
 """Keys below which ``_restore``, or what it calls, looks itself: what optimizers remember, lanes, and what grows."""
 
 
-def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any], past: dict[str, Any]) -> None:
+def save_checkpoint(folder: Path, model: Any, settings: dict[str, Any], past: dict[str, Any]) -> None:
     """Write the training of ``model`` in ``env`` between two updates, its settings, and ``past``: JSON and arrays."""
-    write_checkpoint(folder, settings, _content(model, env, past, _adapter(env).get_state()))
+    write_checkpoint(folder, settings, _content(model, past, _adapter(model).get_state()))
 
 
-def _content(model: Any, env: VecNormalize, past: dict[str, Any], lanes: State) -> dict[str, Any]:
+def _content(model: Any, past: dict[str, Any], lanes: State) -> dict[str, Any]:
     return {
         "past": past,
         "parameters": model.get_parameters(),
         "average": model.average.state_dict(),
         "entropy": getattr(model, "log_ent_coef", None),
         "counts": [int(model.num_timesteps), int(model._n_updates), int(model._episode_num)],
-        "observations": _statistics(env.obs_rms),
-        "rewards": _statistics(env.ret_rms),
-        "returns": env.returns,
-        "last": [model._last_obs, model._last_episode_starts, model._last_original_obs],
+        "last": [model._last_obs, model._last_episode_starts],
         "lanes": lanes,
         "memory": model.algorithm.carried(model),
         "logged": _logged(model.logger),
@@ -50,31 +46,31 @@ def _content(model: Any, env: VecNormalize, past: dict[str, Any], lanes: State) 
     }
 
 
-def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any]) -> dict[str, Any] | None:
+def load_checkpoint(folder: Path, model: Any, settings: dict[str, Any]) -> dict[str, Any] | None:
     """Put model, environment and random states back where they were and return the past; None where there is no checkpoint.
 
     Raises ``ValueError`` as ``read_checkpoint`` does.
     """
 
     def undo(content: dict[str, Any]) -> dict[str, Any]:
-        return _restore(content, model, env)
+        return _restore(content, model)
 
     def restore(content: dict[str, Any]) -> dict[str, Any]:
         past = undo(content)
-        _adapter(env).set_state(content["lanes"])  # last: it changes nothing where it refuses
+        _adapter(model).set_state(content["lanes"])  # last: it changes nothing where it refuses
         return past
 
-    return read_checkpoint(folder, settings, lambda: _content(model, env, {}, {}), restore, undo, FREE)
+    return read_checkpoint(folder, settings, lambda: _content(model, {}, {}), restore, undo, FREE)
 
 
-def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str, Any]:
-    past, shape = content["past"], (env.num_envs, *env.observation_space.shape)  # type: ignore[misc]
+def _restore(content: dict[str, Any], model: Any) -> dict[str, Any]:
+    past, shape = content["past"], (model.n_envs, *model.observation_space.shape)
     if not isinstance(past, dict):
         raise TypeError("its past is no dictionary")
     if min(content["counts"]) < 0:
         raise ValueError(f"counts are {content['counts']}; allowed: >= 0")
     if content["last"][0] is not None:
-        for name, array, own in zip(("last", "starts", "original"), content["last"], (shape, shape[:1], shape), strict=True):
+        for name, array, own in zip(("last", "starts"), content["last"], (shape, shape[:1]), strict=True):
             require_array(name, array, own)
     model.set_parameters(tensors(content["parameters"]), exact_match=True, device="cpu")
     for name in content["parameters"]:
@@ -86,10 +82,7 @@ def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str
         with torch.no_grad():
             model.log_ent_coef.copy_(torch.from_numpy(content["entropy"]))
     model.num_timesteps, model._n_updates, model._episode_num = content["counts"]
-    for running, name in ((env.obs_rms, "observations"), (env.ret_rms, "rewards")):
-        running.mean, running.var, running.count = content[name]  # type: ignore[union-attr]
-    env.returns = content["returns"]
-    model._last_obs, model._last_episode_starts, model._last_original_obs = content["last"]
+    model._last_obs, model._last_episode_starts = content["last"]
     model.algorithm.carry(model, content["memory"])
     _log(model.logger, content["logged"])
     _remember(model, content["episodes"])
@@ -138,11 +131,8 @@ def _remember(model: Any, episodes: Any) -> None:
     model.ep_success_buffer = deque([bool(one) for one in successes], maxlen=window)
 
 
-def _adapter(env: Any) -> SB3VecEnv:
+def _adapter(model: Any) -> SB3VecEnv:
+    env = model.get_env()
     while not isinstance(env, SB3VecEnv):
         env = env.venv
     return env
-
-
-def _statistics(running: Any) -> list[Any]:
-    return [np.array(running.mean), np.array(running.var), float(running.count)]

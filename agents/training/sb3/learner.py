@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from stable_baselines3.common.vec_env import VecNormalize
-
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3.adapter import SB3VecEnv
 from agents.training.sb3.algorithm import ByStableBaselines
@@ -16,7 +14,6 @@ from agents.training.sb3.logged import Logged
 from agents.training.sb3.model import make_model, network_of, unchecked_distributions
 from agents.training.sb3.monitor import Monitor
 from agents.training.sb3.privileged import Privileged
-from agents.training.sb3.shifted_reward import ShiftedReward
 from agents.training.validation import training_seeds
 from agents.training.watch import Watch
 from baselines.network import PolicyNetwork
@@ -30,14 +27,11 @@ class StableBaselines:
         (env,) = envs
         self._env, self._folder = SB3VecEnv(env, staggered=True), folder
         self._settings = settings
+        # Neither observations nor rewards are divided by running statistics: those of a beginner, whose heads run away, stay in
+        # them, and what comes later is small beside it (lab/studies/residual/notes.md).
         seen = Privileged(self._env) if settings.privileged else self._env
-        # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
-        simulation = env.unwrapped.simulation
-        per_step = simulation.periods * simulation.period / 0.01
-        paid = ShiftedReward(seen, per_step, settings.discount) if settings.discount < 1 else seen
-        self._normalized = VecNormalize(paid, gamma=settings.discount)
-        self._model = make_model(algorithm, settings, self._normalized)
-        self._normalized.seed(training_seeds(settings.seed, settings.lanes).start)
+        self._model = make_model(algorithm, settings, seen)
+        seen.seed(training_seeds(settings.seed, settings.lanes).start)
 
     @property
     def steps(self) -> int:
@@ -46,7 +40,7 @@ class StableBaselines:
 
     def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
         """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
-        return load_checkpoint(self._folder, self._model, self._normalized, settings)
+        return load_checkpoint(self._folder, self._model, settings)
 
     def learn(self, watch: Watch, goes_on: bool) -> None:
         """Learn to the end."""
@@ -58,7 +52,7 @@ class StableBaselines:
 
     def network(self) -> PolicyNetwork:
         """The average of the last policies."""
-        return network_of(self._model.algorithm, self._model.average.module, self._normalized)
+        return network_of(self._model.algorithm, self._model.average.module)
 
     def stepping(self) -> tuple[Simulation, float, int]:
         """Of the environment: its simulation, the time in its policy steps, s, and their number."""
@@ -66,4 +60,4 @@ class StableBaselines:
 
     def save(self, settings: dict[str, Any], past: dict[str, Any]) -> None:
         """Write a checkpoint of these ``settings`` with this ``past``, between two updates."""
-        save_checkpoint(self._folder, self._model, self._normalized, settings, past)
+        save_checkpoint(self._folder, self._model, settings, past)

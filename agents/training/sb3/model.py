@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv
 from torch.distributions import Distribution
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
@@ -22,7 +22,7 @@ AVERAGED = 0.05
 """Share of a training over which its policies are averaged."""
 
 
-def make_model(algorithm: ByStableBaselines, settings: TrainingSettings, env: VecNormalize) -> Any:
+def make_model(algorithm: ByStableBaselines, settings: TrainingSettings, env: VecEnv) -> Any:
     """A model of ``algorithm``, which it names, whose mean action is zero everywhere.
 
     Its ``average`` is the exponential average of its policies over the last ``AVERAGED`` of the steps, as far as
@@ -58,21 +58,21 @@ def unchecked_distributions() -> Iterator[None]:
         Distribution.set_default_validate_args(__debug__)  # as PyTorch begins
 
 
-def network_of(algorithm: ByStableBaselines, policy: Any, env: VecNormalize) -> PolicyNetwork:
-    """The deterministic part of a model's policy with its normalisation, as plain arrays."""
+def network_of(algorithm: ByStableBaselines, policy: Any) -> PolicyNetwork:
+    """The deterministic part of a model's policy, which takes observations as they are, as plain arrays."""
 
     def array(tensor: Any) -> NDArray[np.float32]:
         # A copy: the policy goes on training in its own memory.
         return np.array(tensor.detach().cpu().numpy(), dtype=np.float32, order="C")
 
     parts = algorithm.parts(policy)
-    statistics: Any = env.obs_rms
     linear = [layer for layer in parts.inner if isinstance(layer, torch.nn.Linear)]
     layers: tuple[Layer, ...] = tuple((array(layer.weight), array(layer.bias)) for layer in [*linear, parts.last])
     unit: Any = parts.memory
     own = () if unit is None else ((unit.weight_ih_l0, unit.bias_ih_l0), (unit.weight_hh_l0, unit.bias_hh_l0))
     memory: tuple[Layer, ...] = tuple((array(weight), array(bias)) for weight, bias in own)
-    return PolicyNetwork(statistics.mean.copy(), statistics.var.copy(), layers, parts.squashed, memory)
+    inputs = policy.observation_space.shape[0]
+    return PolicyNetwork(np.zeros(inputs), np.ones(inputs), layers, parts.squashed, memory)
 
 
 def _falling(rate: float) -> Callable[[float], float]:
