@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 HYPERPARAMETERS: Mapping[str, Any] = MappingProxyType(
     {
-        "lanes": 256, "rollout": 16, "batch": 2048, "epochs": 2, "gradient_steps": 4, "learning_rate": 1e-3, "discount": 0.96,
+        "lanes": 256, "rollout": 16, "batch": 512, "epochs": 2, "gradient_steps": 4, "learning_rate": 1e-3, "discount": 0.96,
         "gae_lambda": 0.95, "log_std": -1.5, "hidden": (64, 64), "memory": 0,
     }
 )  # fmt: skip

@@ -25,7 +25,7 @@ from baselines.admittance.rows import Constants, Estimate, Follower, Gains, Memo
 from baselines.backstepping.cartesian_law import across, along, load_rates
 from baselines.estimation import rig_filter, rig_reader
 from baselines.estimation.hand.half_wave import sustained
-from baselines.estimation.rig_filter import EAGER, RigFilter
+from baselines.estimation.rig_filter import EAGER, FALLEN, RETURN, RigFilter
 from baselines.estimation.rig_reader import RigReader
 from baselines.estimation.rows import AssumedParameters
 from baselines.valve_inverse import air_at, pressure_openings
@@ -205,6 +205,8 @@ def control_each(world: int, seen: Seen, memory: int, constants: Constants, tabl
         if found > 0:
             finder = RigFilter(block(memory, believing + found)[believing:])
             moved = remembered.follower.moved[i]
+            if FALLEN < finder.age[i] < EAGER:
+                remembered.follower.moved[i] = max(moved, RETURN)
             left = believe(beliefs, i, remembered, constants, own, 1.0 if finder.age[i] < EAGER else moved)
             if find(finder, i, seen, remembered, constants, own, left):
                 rig_filter.bound(finder, i, constants.spread)

@@ -62,6 +62,11 @@ EAGER = 1.0
 """s; found by trial: so long a lane believes at once what is found, by which it holds a head that it would let fall. From then
 on it does so while its motion moves, since at rest a model that changes stirs the head."""
 
+FALLEN, RETURN = 0.3, 0.5
+"""s and 1; found by trial (the second from 0.5 to 0.7, the first from 0.3 to 0.5 make no difference): from then on until
+``EAGER`` is over a lane counts as so far in motion, so that its loop is stiffer. The rig as described lets some heads fall by
+2 to 6 mm in the first 0.3 s; what is found brings them back, with the gain of rest only within another second."""
+
 MARGIN = 3e-3
 """m; assumed: nearer to an end stop than that, its force may be among those of a balance."""
 

@@ -76,4 +76,5 @@ def network_of(algorithm: ByStableBaselines, policy: Any) -> PolicyNetwork:
 
 
 def _falling(rate: float) -> Callable[[float], float]:
-    return lambda remaining: rate * (0.01 + 0.99 * remaining)
+    # The last rollout may end after the last step that was asked for, so that less than nothing remains.
+    return lambda remaining: rate * (0.01 + 0.99 * max(0.0, remaining))

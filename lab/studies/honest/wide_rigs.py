@@ -28,12 +28,18 @@ from lab.studies.comparison.privileged import drawn_rigs
 KNOWS = "admittance-adaptive[own_beliefs=true]"
 """The controller each lane of which is told its rig besides."""
 
-METRICS = {"circle": ("settled_rms", 5.0), "probe": ("hunting", 2.0)}
-"""Scenario -> its metric, mm, and what is too much of it; assumed."""
+METRICS = {
+    "circle": ("circle", "settled_rms", "settled error", 5.0),
+    "probe": ("probe", "hunting", "hunting", 2.0),
+    "probe-error": ("probe", "settled_rms", "settled error", 5.0),
+}
+"""Name -> scenario, metric, mm, as it is called, and what is too much of it; assumed."""
+
+SCENARIOS = tuple(dict.fromkeys(scenario for scenario, *_ in METRICS.values()))
 
 
 def measure(scenario: str, controller: str, source: str, rig: dict[str, Any], told: bool, episodes: int, seed: int) -> Result:
-    """Of worlds within their rigs' strength: the metric of ``METRICS``, mm, or "lost", and stiffness errors, %.
+    """Of worlds within their rigs' strength: metrics of ``METRICS``, mm, or "lost", and stiffness errors, %.
 
     Rigs are drawn from the ranges that the filter of rigs expects; the controller believes ``rig``, or is ``told`` each."""
     believed = Parameters.from_dict(rig)
@@ -45,7 +51,8 @@ def measure(scenario: str, controller: str, source: str, rig: dict[str, Any], to
     within = np.asarray(found.required_strength_ratio) <= FEASIBLE
     values = {name: np.asarray(values) for name, values in found.metrics.items()}
     values["hunting"] = np.fmax(values["hunting_x"], values["hunting_y"])
-    named = {"error": values[METRICS[scenario][0]], "stiffness_error": np.abs(values["stiffness_error"])}
+    named = {metric: values[metric] for of, metric, *_ in METRICS.values() if of == scenario}
+    named["stiffness_error"] = np.abs(values["stiffness_error"])
     return jsonable({name: penalize_lost(each, found.lost)[within].tolist() for name, each in named.items()})  # type: ignore[no-any-return]
 
 
@@ -57,7 +64,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
             measure,
             {"scenario": scenario, **controller_settings(name, Parameters()), "told": told, **worlds},
         )
-        for scenario, (name, told) in product(METRICS, _rows(options))
+        for scenario, (name, told) in product(SCENARIOS, _rows(options))
     }
 
 
@@ -75,8 +82,8 @@ def _figures(values: list[Any], most: float) -> dict[str, Any]:
 def _kept(options: Options, found: Found) -> Any:
     rows = []
     for name, told in _rows(options):
-        of = {one: found[one, name, told] for one in METRICS}
-        figures = {one: _figures(of[one]["error"], most) for one, (_, most) in METRICS.items()}
+        of = {one: found[one, name, told] for one in SCENARIOS}
+        figures = {one: _figures(of[scenario][metric], most) for one, (scenario, metric, _, most) in METRICS.items()}
         stiffness = _figures(of["probe"]["stiffness_error"], np.inf)
         rows.append({"controller": name, "told": told, **figures, "stiffness_error": stiffness})
     return jsonable(rows)
@@ -84,11 +91,8 @@ def _kept(options: Options, found: Found) -> Any:
 
 def _shown(content: Content) -> dict[str, str]:
     titles = [
-        Head(
-            f"{scenario}: {'settled error' if metric == 'settled_rms' else metric}, mm",
-            (*SPREAD_AND_WORST, f"beyond {most:g} mm"),
-        )
-        for scenario, (metric, most) in METRICS.items()
+        Head(f"{scenario}: {called}, mm", (*SPREAD_AND_WORST, f"beyond {most:g} mm"))
+        for scenario, _, called, most in METRICS.values()
     ]
     titles.append(Head("stiffness error, %", SPREAD_AND_WORST))
     rows: list[list[Cell | Head]] = [["controller", *information.COLUMNS, *titles]]
@@ -116,7 +120,7 @@ STUDY = Study(
     {"controller": CONTROLLERS, "episodes": 256, "seed": 993000},
     _tasks,
     _kept,
-    {"circle": "mm", "probe": "mm", "stiffness_error": "%"},
+    {**dict.fromkeys(METRICS, "mm"), "stiffness_error": "%"},
     _shown,
     words={"controller": "registered names, with options"},
 )
