@@ -63,12 +63,13 @@ def run(settings: Settings) -> None:
     evaluations = [gathered(name, [done[task.name] for task in tasks]) for name, tasks in pieces.items()]
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     from baselines.figures.runs import error_over_time
+    from baselines.figures.style import drawn_for
 
     caption = f"{settings.env}, {settings.episodes} episodes from seed {settings.seed}, {settings.sensors} sensors, "
     caption += f"--randomize {settings.randomize}"
     caption += "".join(f", {name.replace('_', ' ')}: {part}" for name, part in settings.parts().items())
     classical, learned = evaluations[:known], evaluations[known:]
-    seeds, pictures = "", "error_over_time"
+    seeds = ""
     if len(learned) > 1:
         from agents.policy.seeds import as_table, seed_metrics
         from agents.reports.learning_curves import draw_learning_curves, learning_curves
@@ -76,23 +77,21 @@ def run(settings: Settings) -> None:
         together = merged(learned, f"residual, {len(learned)} seeds")
         evaluations = [*classical, together]
         seeds = "".join(f"\n{as_table(seed_metrics(one, learned))}\n" for one in classical)
-        pictures += ", learning_curves"
     lines = [caption, "", overview(evaluations)]
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
-    with whole_results(folder) as place:
+    with drawn_for(settings.style), whole_results(folder) as place:
         write_text(place / "evaluation.csv", data(evaluations))
         write_text(place / "evaluation.md", f"{caption}\n\n{drawn}\n\n{table(evaluations)}\n{seeds}")
         write_json(place / "evaluation.json", {"arguments": settings.shown(), "rig": rig.to_dict(), "results": results})
         # The only file that differs from run to run.
         write_json(place / "times.json", {"us_per_lane_and_call": {one.controller: one.cost for one in evaluations}})
-        error_over_time(evaluations, caption, place)
+        drawings = error_over_time(evaluations, caption, place)
         if seeds:
             write_text(place / "seeds.md", f"{caption}\n{seeds}")
-            draw_learning_curves(learning_curves(policies), place)
+            drawings += draw_learning_curves(learning_curves(policies), place)
     print("\n".join(lines))
-    print(
-        f"\nwritten to {folder}/: evaluation.md and .csv (every metric), evaluation.json, times.json, {pictures} (.png, .svg)"
-    )
+    files = ", ".join(path.name for path in drawings)
+    print(f"\nwritten to {folder}/: evaluation.md and .csv (every metric), evaluation.json, times.json, {files}")
 
 
 def _policies(path: str | None) -> tuple[list[Path], list[str], set[str]]:

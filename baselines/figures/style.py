@@ -89,6 +89,12 @@ def drawn_for(kind: str) -> Iterator[None]:
         STYLE.update(PAPER if _CHOSEN.get() == "paper" else _SCREEN)
 
 
+def linked(paths: Sequence[Path]) -> list[str]:
+    """Markdown of the figures that ``save`` wrote to ``paths``: each as a picture once, or as a link to its PDF."""
+    links = [f"[{path.name}]({path.name})" for path in paths if path.suffix != ".svg"]
+    return [link if ".pdf" in link else f"!{link}" for link in links]
+
+
 def look(k: int, markers: bool = True) -> dict[str, Any]:
     """Colour, line style and marker of the k-th of several controllers: twelve that a grey print tells apart by marker, and
     twelve more whose markers are hollow."""

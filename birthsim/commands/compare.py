@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from baselines.identification.comparing.report import data_of, printed, report
-from birthsim.command_line.settings import MANY, TABLE, WORLD, Logged, number
+from birthsim.command_line.settings import MANY, TABLE, WORLD, Logged, Style, number
 from birthsim.identification import compare_log, judging_of
 from birthsim_env.files import make_folder, whole_results, write_json, write_text
 from birthsim_live.logs.recording import SUFFIX
@@ -40,6 +40,7 @@ class Settings(Logged):
     """For positions, this error instead."""
     horizon: Annotated[float | None, number("S")] = None
     """Duration of the free runs, which begin all over the log. [default: 2]"""
+    style: Style = "screen"
     out: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     """Folder for report.md, compare.json, figures, and twin.rec, which birthsim live --replay plays."""
 
@@ -54,12 +55,12 @@ def main(settings: Settings) -> None:
     if folder is not None:
         # pyplot takes half a second to load.
         from baselines.figures.compared import free_run_figure, windows_figure
+        from baselines.figures.style import drawn_for, linked
 
-        with whole_results(folder) as place:
+        with drawn_for(settings.style), whole_results(folder) as place:
             drawn = [*windows_figure(found, place), *free_run_figure(found, place)]
-            pictures = [path.name for path in drawn if path.suffix == ".png"]
-            write_text(place / "report.md", report(found, settings.log.name, pictures))
+            write_text(place / "report.md", report(found, settings.log.name, linked(drawn)))
             write_json(place / "compare.json", data_of(found, settings.log.name))
             write_twin(found.nearest, found.trial, place / TWIN)
-        print(f"written to {folder}/: report.md, compare.json, {', '.join(pictures)} (each picture as .svg too), {TWIN}")
+        print(f"written to {folder}/: report.md, compare.json, {', '.join(path.name for path in drawn)}, {TWIN}")
         print(f"birthsim live --replay {folder / TWIN} plays the log beside {found.nearest.name}")

@@ -17,6 +17,7 @@ from birthsim.command_line.settings import (
     RigFile,
     Sensors,
     Set,
+    Style,
     WorldSeed,
     whole,
 )
@@ -44,6 +45,7 @@ class Settings(Parts, Processes):
     randomize: Randomize = "all"
     """What differs between episodes; sensors means the scenario, and the parameters of honest sensors."""
     parameters: RigFile = None
+    style: Style = "screen"
     out: Path
     """Folder for evaluation.json, .md and .csv, and figures."""
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from baselines.bench.statistics import number
 from baselines.tables import aligned, markdown
-from birthsim.command_line.settings import Configured
+from birthsim.command_line.settings import Configured, Style
 from birthsim_env.extras import installation
 from birthsim_env.files import make_folder, whole_results, write_json, write_text
 
@@ -24,8 +24,9 @@ class Settings(Configured):
     """A folder that birthsim train wrote, or the name of a shipped policy."""
     no_pushes: bool = False
     """Leave out the stiffness test, which takes minutes."""
+    style: Style = "screen"
     out: Path
-    """Folder for correction.png and .svg, residual.md, residual.json."""
+    """Folder for the figure, residual.md, residual.json."""
 
 
 def main(settings: Settings) -> None:
@@ -39,6 +40,7 @@ def main(settings: Settings) -> None:
         from agents.residual.settings import NO_LAW
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: {installation('agents')}") from error
+    from baselines.figures.style import drawn_for
     from baselines.named import make_controller
     from birthsim_env.physics.rig.parameters import Parameters
 
@@ -85,10 +87,10 @@ def main(settings: Settings) -> None:
         tables.append((title, head, felt))
     marked = [f"{title}\n\n{markdown(top, cells)}\n" for title, top, cells in tables]
     content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
-    with whole_results(folder) as place:
-        draw_corrections(weights[0], correlations[0], friction, place)
+    with drawn_for(settings.style), whole_results(folder) as place:
+        drawn = draw_corrections(weights[0], correlations[0], friction, place)
         write_text(place / "residual.md", "\n".join(marked))
         write_json(place / "residual.json", content)
     for title, top, cells in tables:
         print(f"{title}\n\n{aligned(top, cells)}\n")
-    print(f"written to {folder}/: correction.png and .svg, residual.md, residual.json")
+    print(f"written to {folder}/: {', '.join(path.name for path in drawn)}, residual.md, residual.json")

@@ -17,7 +17,7 @@ from baselines.identification.log.log_file import read_trial, write_trial
 from baselines.identification.valve_table import fit_valve_table
 from baselines.logs.writing import WRITERS
 from baselines.named import make_controller
-from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Logged, RigFile, Seed, number
+from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Logged, RigFile, Seed, Style, number
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
@@ -51,6 +51,7 @@ class Settings(Logged):
     """File for the rig, .toml; with --simulate for the log, .csv, .parquet or .mcap."""
     report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     """Folder for report.md and figures of the residuals."""
+    style: Style = "screen"
     duration: Annotated[float | None, number("S")] = None
     """Duration of the proposed experiment. [default: 12]"""
     controller: Annotated[str | None, CONTROLLER] = None
@@ -127,14 +128,13 @@ def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
     if folder is not None:
         # pyplot takes half a second to load.
         from baselines.figures.identification import intervals_figure, residuals_figure
+        from baselines.figures.style import drawn_for, linked
 
-        with whole_results(folder) as place:
+        with drawn_for(settings.style), whole_results(folder) as place:
             drawn = [*residuals_figure(found, place), *intervals_figure(found, place)]
-            pictures = [path.name for path in drawn if path.suffix == ".png"]
-            shown = [f"![{name}]({name})" for name in pictures]
-            text = [f"# {log.name}", "", *(f"- {line}" for line in (*found.notes, *found.words())), "", *shown]
+            text = [f"# {log.name}", "", *(f"- {line}" for line in (*found.notes, *found.words())), "", *linked(drawn)]
             write_text(place / "report.md", "\n".join(text) + "\n")
-        print(f"written to {folder}/: report.md, {', '.join(pictures)} (each picture as .svg too)")
+        print(f"written to {folder}/: report.md, {', '.join(path.name for path in drawn)}")
 
 
 def _out(settings: Settings, suffixes: tuple[str, ...]) -> Path:

@@ -16,6 +16,15 @@ from tests.console import OWN, assert_picture, call, interrupted, strict
 
 
 @pytest.mark.usefixtures("brief")
+def test_for_a_paper_its_figure_is_a_pdf(tmp_path, monkeypatch, capsys):
+    arguments = ("--env", "BirthSIM/Probe-v3", "--episodes", "1", "--controller", "backstepping", "--jobs", 1)
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--style", "paper", "--out", tmp_path)
+    assert status == 0, complained
+    assert [path.name for path in tmp_path.iterdir() if path.stem == "error_over_time"] == ["error_over_time.pdf"]
+    assert "error_over_time.pdf" in printed
+
+
+@pytest.mark.usefixtures("brief")
 def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys):
     out = tmp_path / "new" / "folder"
     controllers = ("--controller", "backstepping", "backstepping-weight")

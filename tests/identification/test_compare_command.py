@@ -54,6 +54,20 @@ def test_several_rigs_are_ranked_and_reported(
         assert part_of in text
 
 
+def test_for_a_paper_its_figures_are_linked_pdfs(
+    log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = log.parent / "out"
+    status, printed, _ = call("compare", monkeypatch, capsys, log, "--style", "paper", "--out", out)
+    assert status == 0
+    pictures = {path.name for path in out.iterdir() if path.suffix in (".png", ".svg", ".pdf")}
+    assert pictures == {"free_run.pdf", "windows.pdf"}
+    assert all(name in printed for name in pictures)
+    text = (out / "report.md").read_text()
+    assert "[windows.pdf](windows.pdf)" in text
+    assert "![" not in text
+
+
 def test_one_rig_is_shown_in_full_with_the_limits_that_are_asked(
     log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -32,7 +32,7 @@ def printed(found: Comparison) -> str:
 
 
 def report(found: Comparison, title: str, pictures: Sequence[str]) -> str:
-    """The whole comparison as Markdown, with pictures by their names."""
+    """The whole comparison as Markdown, whose last lines are those of its ``pictures``."""
     lines = [f"# {title}", "", *(f"- {line}" for line in (*found.notes, *verdicts(found))), ""]
     if len(found.rigs) > 1:
         lines += _shown(_ranking(found))
@@ -40,7 +40,7 @@ def report(found: Comparison, title: str, pictures: Sequence[str]) -> str:
         lines += [f"## {one.name}", ""]
         for part in parts_of(found, one):
             lines += _shown(part)
-    return "\n".join([*lines, *(f"![{name}]({name})" for name in pictures)]) + "\n"
+    return "\n".join([*lines, *pictures]) + "\n"
 
 
 def _shown(part: Part) -> list[str]:
