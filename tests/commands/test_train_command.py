@@ -16,19 +16,19 @@ from tests.training.left import checkpoint_left
 def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_path, monkeypatch, capsys):
     folder, done = trained
     assert done.returncode == 0, done.stderr
-    assert [path.name for path in folder.iterdir()] == ["seed_3"]
-    own = folder / "seed_3"
+    assert [path.name for path in folder.iterdir()] == ["seed_12"]
+    own = folder / "seed_12"
     assert {path.name for path in own.iterdir()} - {".lock"} == {WEIGHTS, CHECKPOINT, "training.json", "tensorboard"}
     reached, policy = strict(own / "training.json"), read_policy(own)
     assert policy.training["reached"] == reached["policy"]
-    assert (policy.environment, policy.settings.authority, policy.training["seed"]) == (RESIDUAL, 60.0, 3)
+    assert (policy.environment, policy.settings.authority, policy.training["seed"]) == (RESIDUAL, 60.0, 12)
     assert (reached["settings"]["steps"], reached["settings"]["authority"], reached["settings"]["lanes"]) == (4096, 60.0, 32)
     assert reached["policy"]["pooled_mm"] < reached["law"]["pooled_mm"]
     assert f"{'backstepping':26}{reached['law']['pooled_mm']:7.2f} mm{reached['law']['tail_mm']:7.2f} mm" in done.stdout
-    assert f"{'seed 3':26}{reached['policy']['pooled_mm']:7.2f} mm" in done.stdout
+    assert f"{'seed 12':26}{reached['policy']['pooled_mm']:7.2f} mm" in done.stdout
     assert "% below" in done.stdout
     assert f"written to {folder}/" in done.stdout
-    assert "seed 3: " in done.stderr  # the progress bar
+    assert "seed 12: " in done.stderr  # the progress bar
     assert "% better" in done.stderr
     assert "Warning" not in done.stderr
     medians = []
@@ -50,21 +50,21 @@ def test_train_goes_on_where_its_folder_stopped_and_refuses_a_policy_from_elsewh
     trained, small, tmp_path, monkeypatch, capsys
 ):
     folder, _ = trained
-    options = ("--config", small, "--steps", 4096, "--seed", 3, "--authority", 60)
+    options = ("--config", small, "--steps", 4096, "--seed", 12, "--authority", 60)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
     status, printed, _ = call("train", monkeypatch, capsys, *options, "--out", folder)
     assert status == 0, "a training that is over is reported once more"
-    assert "seed 3: 4,096 of 4,096 steps are there and are kept\n" in printed
+    assert "seed 12: 4,096 of 4,096 steps are there and are kept\n" in printed
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
     assert after == before
     # A policy that came from elsewhere is not written over.
     for name in (WEIGHTS, "training.json"):
-        own = tmp_path / name.partition(".")[0] / "seed_3"
+        own = tmp_path / name.partition(".")[0] / "seed_12"
         own.mkdir(parents=True)
-        (own / name).write_bytes((folder / "seed_3" / name).read_bytes())
+        (own / name).write_bytes((folder / "seed_12" / name).read_bytes())
         status, _, complained = call("train", monkeypatch, capsys, *options, "--out", own.parent)
         assert status == 2
-        assert complained.endswith(f"/seed_3' has {name} but not its {CHECKPOINT}; allowed: another folder\n")
+        assert complained.endswith(f"/seed_12' has {name} but not its {CHECKPOINT}; allowed: another folder\n")
 
 
 @pytest.mark.slow
