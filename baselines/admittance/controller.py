@@ -367,7 +367,7 @@ class AdmittanceController(StagedController):
             identified=self._identified,
             learns_mass=weighs,
             weighs_friction=weighs,
-            feels_stiff_hand=learns_force,
+            feels_stiff_hand=learns_force or weighed,
             weighed=weighed,
             rows_of_memory=len(fresh),
             rows_of_bank=self._rows_of_bank,

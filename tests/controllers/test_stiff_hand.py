@@ -5,7 +5,7 @@ import pytest
 
 from baselines.admittance.controller import AdmittanceController
 from baselines.admittance.rows import Constants, Memory
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from lab.studies.haptics.worlds import POSES
 from lab.studies.held import hold
 from lab.studies.shaken import STIFFNESS, at_rest
@@ -19,9 +19,9 @@ class Unfeeling(AdmittanceController):
     """The adaptive law without an answer to a stiff hand."""
 
     def controller_stages(self, sampled):
-        (own,) = super().controller_stages(sampled)
-        own.constants[Constants.feels_stiff_hand.first] = 0.0
-        return [own]
+        stages = super().controller_stages(sampled)
+        stages[-1].constants[Constants.feels_stiff_hand.first] = 0.0
+        return stages
 
 
 def port(answers, mass=3.0):
@@ -32,6 +32,14 @@ def port(answers, mass=3.0):
     return RigPort([rig] * lanes, reference, law, "honest", 5), reference, law
 
 
+def clamped_by_acceleration(answers, mass):
+    """Newtons, (N,), peak to peak, that a stiff hand feels of rigs without a force sensor, whose law is told them."""
+    lanes = len(POSES)
+    rig = load_parameters("examples/acceleration_sensor_rig.toml").replace({"mechanics.mass": mass})
+    law, reference = (AdmittanceController if answers else Unfeeling)(rig, force_sensor=False), at_rest(lanes, POSES, STIFFNESS)
+    return hold(RigPort([rig] * lanes, reference, law, "honest", 6, force_sensor=False), reference)["force"]
+
+
 @pytest.mark.parametrize("mass", [4.5, 5.5])
 def test_a_stiff_hand_is_shaken_by_a_quarter_of_what_a_loop_does_that_does_not_feel_it(mass):
     shaken, calm = (hold(*port(answers, mass)[:2])["force"] for answers in (False, True))
@@ -39,6 +47,14 @@ def test_a_stiff_hand_is_shaken_by_a_quarter_of_what_a_loop_does_that_does_not_f
     assert shaken.max() > 15.0
     assert calm.max() < 5.0
     assert (calm < 0.25 * shaken.max()).all()
+
+
+@pytest.mark.parametrize("mass", [4.0, 4.5])
+def test_a_stiff_hand_is_felt_by_an_acceleration_sensor_too(mass):
+    shaken, calm = (clamped_by_acceleration(answers, mass) for answers in (False, True))
+    assert shaken.max() > 10.0
+    # Friction is told from the hand less well than by a force sensor.
+    assert (calm < 0.5 * shaken.max()).all()
 
 
 def push(answers, newtons):
