@@ -12,6 +12,7 @@ from birthsim_build.code.stack import stack_bytes
 from birthsim_build.code.threads import Threads
 from birthsim_build.device.export import write_programs
 from birthsim_build.estimate import estimates
+from birthsim_build.faces.beliefs import beliefs
 from birthsim_build.faces.c import write_examples, write_header, write_kernels
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
@@ -61,7 +62,7 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
         str(folder / "libbirthsim.so"),
         str(folder / "birthsim.o"),
     )
-    write_header(images, bundle.rig.electronics.control_period, folder)
+    write_header(images, bundle.rig.electronics.control_period, folder, beliefs(bundle, images))
     write_examples(images, folder)
     return {"target": target, "library": (folder / "libbirthsim.so").stat().st_size, **built}
 
@@ -70,7 +71,7 @@ def build_cortex(bundle: Bundle, folder: Path) -> Report:
     """Write the object of the laws alone, its header and an example; returns sizes in bytes, and what a period takes."""
     images = {name: words for name, words in bundle.images().items() if name.startswith(LAW)}
     built = _object(bundle, "cortex-m7", folder, images)
-    write_header(images, bundle.rig.electronics.control_period, folder)
+    write_header(images, bundle.rig.electronics.control_period, folder, beliefs(bundle, images))
     write_examples(images, folder, linked=False)
     assembly = folder / "birthsim.s"
     stack = stack_bytes(assembly.read_text(), "birthsim_advance", "birthsim_stage_")

@@ -43,8 +43,13 @@ class Part:
 
 def function_name(stage: Stage | Adjoint) -> str:
     """Where the function of a stage, or of its adjoint, is, as ``module:name``."""
-    function: Any = getattr(stage.function, "py_func", stage.function)
-    return f"{function.__module__}:{function.__qualname__}"
+    return name_of(stage.function)
+
+
+def name_of(function: Any) -> str:
+    """Where a kernel is, as ``module:name``."""
+    plain = getattr(function, "py_func", function)
+    return f"{plain.__module__}:{plain.__qualname__}"
 
 
 def packed_part(part: Part, functions: Sequence[str]) -> Words:

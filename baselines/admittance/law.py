@@ -198,7 +198,7 @@ def control_each(world: int, seen: Seen, memory: int, constants: Constants, tabl
     rows, found, missed = int(constants.rows_of_memory), int(constants.rows_of_finder), 0
     believing, read = rows + Belief.size, int(constants.rows_of_reader)
     whole, beliefs = block(memory, rows), Belief(block(memory, believing)[rows:])
-    remembered, _ = estimator.parts(whole, constants)
+    remembered, bank = estimator.parts(whole, constants)
     for i in range(n):
         signals, estimate = Seen(seen.rows[:, i : i + 1]), Estimate(scratch(Estimate.size)[:, :1])
         own = Constants(column(Constants.size))
@@ -207,7 +207,8 @@ def control_each(world: int, seen: Seen, memory: int, constants: Constants, tabl
             moved = remembered.follower.moved[i]
             if FALLEN < finder.age[i] < EAGER:
                 remembered.follower.moved[i] = max(moved, RETURN)
-            left = believe(beliefs, i, remembered, constants, own, 1.0 if finder.age[i] < EAGER else moved)
+            eager = 1.0 if finder.age[i] < EAGER else moved
+            left = believe(beliefs, i, seen, remembered, bank, constants, own, eager)
             if find(finder, i, seen, remembered, constants, own, left):
                 rig_filter.bound(finder, i, constants.spread)
                 if read > 0:
@@ -219,6 +220,6 @@ def control_each(world: int, seen: Seen, memory: int, constants: Constants, tabl
                     rig_filter.heed(finder, i)
                 rig_filter.tell(finder, i, constants.model.rig, beliefs.told)
         else:
-            believe(beliefs, i, remembered, constants, own, 1.0)
+            believe(beliefs, i, seen, remembered, bank, constants, own, 1.0)
         missed += advance(signals, whole[:, i : i + 1], estimate, own)
     return missed

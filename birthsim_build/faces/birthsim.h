@@ -6,6 +6,7 @@
 #ifndef BIRTHSIM_H
 #define BIRTHSIM_H
 
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -48,7 +49,7 @@ static inline double birthsim_get(const birthsim_word *loop, int row) {
 static inline void birthsim_set(birthsim_word *loop, int row, double value) {
   loop[BIRTHSIM_HEAD + row].number = value;
 }
-
+@BELIEFS@
 #ifdef __cplusplus
 }
 #endif

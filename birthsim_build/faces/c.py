@@ -44,8 +44,8 @@ _WORKED_LAW = """
  *"""
 
 
-def write_header(images: Mapping[str, Words], period: float, folder: Path) -> None:
-    """Write ``birthsim.h`` into ``folder``; ``period`` is a control period, s."""
+def write_header(images: Mapping[str, Words], period: float, folder: Path, told: str = "") -> None:
+    """Write ``birthsim.h`` into ``folder``; ``period`` is a control period, s, ``told`` what ``beliefs`` says."""
     rows = "\n".join(
         f"  BIRTHSIM_{row.name.upper()} = {row.number}, /* {row.about}, {row.unit}"
         + (f"; the first of {row.count} */" if row.count > 1 else " */")
@@ -65,7 +65,7 @@ def write_header(images: Mapping[str, Words], period: float, folder: Path) -> No
     text = (HERE / "birthsim.h").read_text()
     for mark, value in (
         *(("HEAD", str(HEAD)), ("ROWS", str(ROWS)), ("ENUM", rows), ("LOOPS", loops), ("EXAMPLES", examples)),
-        *(("PERIOD", repr(period)), ("WORKED", " *" + "".join(worked))),
+        *(("PERIOD", repr(period)), ("BELIEFS", told), ("WORKED", " *" + "".join(worked))),
         ("WHAT", "controllers" if set(_programs(images)) == {"controller"} else "closed loops"),
     ):
         text = text.replace(f"@{mark}@", value)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_build.fmu.derived_parameters import derived_parameters
+from birthsim_build.derived_parameters import derived_parameters
 from birthsim_build.fmu.description import Description, Variable
 from birthsim_build.fmu.units import Input, Unit
 from birthsim_build.image import HEAD, Words, changing_words, function_name, packed_image, packed_part, packed_rows

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from birthsim_build.derived_parameters import parameter_names
 from birthsim_build.fmu.clock import clock_stage
-from birthsim_build.fmu.derived_parameters import parameter_names
 from birthsim_build.image import Part
 from birthsim_build.layout import LAYOUT, Row
 from birthsim_build.loops import World, alone_rows

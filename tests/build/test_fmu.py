@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from baselines.named import make_controller
+from birthsim_build.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu import archive
-from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.description import exponents
 from birthsim_env import Parameters, Plant
 from birthsim_env.loop.rows import FORCE, STATE

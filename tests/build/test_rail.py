@@ -10,8 +10,8 @@ from baselines.named import make_controller
 from birthsim_build.building import build_c
 from birthsim_build.bundle import loop_name, make_bundle
 from birthsim_build.code.targets import HOST
+from birthsim_build.derived_parameters import parameter_names
 from birthsim_build.estimate import estimates
-from birthsim_build.fmu.derived_parameters import parameter_names
 from birthsim_env import Parameters, Reference
 from birthsim_env.loop.rows import ASKED, REFERENCE, WORLD, measurement_of
 from lab.studies.targets.reference import SHARED, as_inputs, loop_rows, whole_rows
