@@ -46,7 +46,7 @@ def drive(settings: "Settings") -> None:
         seconds = told.duration if told.plan is None and told.environment is None else None
         with tqdm(total=seconds, desc="drive", unit=" s", leave=False, bar_format="{desc}: {n:.1f} s [{elapsed}]") as bar:
             outcome = perform(told, folder, lambda now: bar.update(now - bar.n))
-        _write(outcome, told, folder)
+        _write(outcome, told, folder, settings.style)
     if outcome.interrupted is not None:
         raise outcome.interrupted
     if outcome.faults and not told.dry:
@@ -102,7 +102,7 @@ def _recover(folder: Path, rig: Parameters) -> None:
     forget(folder)
 
 
-def _write(outcome: Outcome, told: Drive, folder: Path) -> None:
+def _write(outcome: Outcome, told: Drive, folder: Path, style: str) -> None:
     timing, files = outcome.timing, ["timing.json"]
     by_clock = told.simulated is None or not told.simulated.lockstep
     with whole_results(folder) as place:
@@ -113,12 +113,12 @@ def _write(outcome: Outcome, told: Drive, folder: Path) -> None:
         write_json(place / "timing.json", {**timing.summary(), "system": outcome.granted})
         if outcome.sampled.size and by_clock:
             # pyplot takes half a second to load.
+            from baselines.figures.style import drawn_for
             from baselines.figures.timing import timing_figure
 
-            timing_figure(
-                {"period": timing.periods, "jitter": timing.jitter, "computing": timing.computing}, timing.period, place
-            )
-            files += ["timing.png"]
+            times = {"period": timing.periods, "jitter": timing.jitter, "computing": timing.computing}
+            with drawn_for(style):
+                files += [path.name for path in timing_figure(times, timing.period, place)]
     print(f"{limited_name(told)}, {outcome.sampled.shape[1]} samples; {outcome.granted}")
     print("\n".join(timing.words()) if by_clock else "in lockstep: no clock runs, so that nothing is late")
     for fault in outcome.faults:

@@ -14,7 +14,7 @@ SMALLEST = 1e-6
 
 
 def timing_figure(times: Mapping[str, Array], period: float, folder: Path) -> list[Path]:
-    """Shares of periods in which each of some ``times`` (T,), s, was longer than a time, to a ``timing.png`` in a folder."""
+    """Shares of periods in which each of some ``times`` (T,), s, was longer than a time, to files ``timing`` in a folder."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(COLUMN, 2.6), layout="constrained")
         for k, (name, values) in enumerate(times.items()):

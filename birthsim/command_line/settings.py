@@ -121,6 +121,14 @@ Style = Annotated[
     Literal["screen", "paper"],
     Parameter(help="Figures for a screen (PNG and SVG) or for a paper (PDF: a column wide, letters of 8 pt, no titles)."),
 ]
+
+
+def require_folder(style: str, folder: Path | None, option: str) -> None:
+    """Raise ``ValueError`` where a ``style`` is asked for and no ``folder`` for figures, which ``option`` names."""
+    if style != "screen" and folder is None:
+        raise ValueError(f"--style {style} is given; allowed with --{option} FOLDER only")
+
+
 MANY = Parameter(consume_multiple=True)
 """An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")

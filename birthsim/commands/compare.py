@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from baselines.identification.comparing.report import data_of, printed, report
-from birthsim.command_line.settings import MANY, TABLE, WORLD, Logged, Style, number
+from birthsim.command_line.settings import MANY, TABLE, WORLD, Logged, Style, number, require_folder
 from birthsim.identification import compare_log, judging_of
 from birthsim_env.files import make_folder, whole_results, write_json, write_text
 from birthsim_live.logs.recording import SUFFIX
@@ -47,6 +47,7 @@ class Settings(Logged):
 
 def main(settings: Settings) -> None:
     """Compare, print, and write the report."""
+    require_folder(settings.style, settings.out, "out")
     asked = {name: value for name in ASKED if (value := getattr(settings, name)) is not None}
     judging = judging_of(**asked)
     folder = None if settings.out is None else make_folder(settings.out)

@@ -15,6 +15,7 @@ from birthsim.command_line.settings import (
     Configured,
     RigFile,
     Seed,
+    Style,
     number,
     whole,
 )
@@ -72,8 +73,9 @@ class Settings(Configured):
     """The simulated rig waits for every answer instead of running by the clock."""
     provoke: Annotated[list[str], MANY, Parameter(group=SIMULATED, metavar="KIND@S...")] = field(default_factory=list)
     """Faults of the simulated rig, such as nan-pressure@1.5 or silence@2+0.01."""
+    style: Style = "screen"
     out: Path | None = None
-    """Folder for log.csv, asked.csv, timing.json and, by the clock, timing.png."""
+    """Folder for log.csv, asked.csv, timing.json and, by the clock, the figure timing."""
 
 
 def main(settings: Settings) -> None:

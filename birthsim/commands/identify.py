@@ -17,7 +17,7 @@ from baselines.identification.log.log_file import read_trial, write_trial
 from baselines.identification.valve_table import fit_valve_table
 from baselines.logs.writing import WRITERS
 from baselines.named import make_controller
-from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Logged, RigFile, Seed, Style, number
+from birthsim.command_line.settings import CONTROLLER, SENSORS, TABLE, Logged, RigFile, Seed, Style, number, require_folder
 from birthsim_env.files import make_folder, whole_results, write_text
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
@@ -75,6 +75,7 @@ def main(settings: Settings) -> None:
             option = name.replace("_", "-")
             owner = "LOG" if needed == "log" else f"--{needed.replace('_', '-')}"
             raise ValueError(f"--{option} is given; allowed with {owner} only")
+    require_folder(settings.style, settings.report, "report")
     rig = load_parameters(settings.parameters)
     if settings.log is not None:
         _from_log(settings, settings.log, rig)

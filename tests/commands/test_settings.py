@@ -84,3 +84,20 @@ def test_a_sensor_model_that_there_is_not_is_refused_with_those_that_there_are(n
     code, _, said = call(name, monkeypatch, capsys, *COMMANDS[name].example.split(), "--sensors", "none")
     assert code == 2
     assert_says(("sensors", *names("sensors")), said)
+
+
+@pytest.mark.parametrize(("name", "option"), [("compare", "out"), ("identify", "report")])
+def test_a_style_of_figures_that_nothing_draws_is_refused(name, option, tmp_path, monkeypatch, capsys):
+    (tmp_path / "log.csv").write_text("time,openings_P1\n0,0\n")
+    status, _, complained = call(name, monkeypatch, capsys, tmp_path / "log.csv", "--style", "paper")
+    assert status == 2
+    assert_says(("--style paper", f"--{option} FOLDER"), complained)
+
+
+@pytest.mark.slow
+def test_what_a_residual_has_learned_is_drawn_for_a_paper(tmp_path, monkeypatch, capsys):
+    line = ("--policy", "descent", "--no-pushes", "--style", "paper", "--out", tmp_path)
+    status, printed, complained = call("explain", monkeypatch, capsys, *line)
+    assert status == 0, complained
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["correction.pdf", "residual.json", "residual.md"]
+    assert "correction.pdf" in printed

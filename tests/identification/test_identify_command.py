@@ -66,6 +66,20 @@ def test_a_log_that_is_read_by_options_and_what_is_said_of_it(
 
 
 @pytest.mark.slow
+def test_for_a_paper_the_figures_of_a_log_are_linked_pdfs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, report = tmp_path / "log.parquet", tmp_path / "report"
+    write_trial(part(trial(), 0, 2100), log, TRUE)
+    line = (log, "--out", tmp_path / "rig.toml", "--report", report, "--friction-law", "lugre", "--style", "paper")
+    assert call("identify", monkeypatch, capsys, *line)[0] == 0
+    assert sorted(path.name for path in report.iterdir()) == ["intervals.pdf", "report.md", "residuals.pdf"]
+    text = (report / "report.md").read_text()
+    assert "[residuals.pdf](residuals.pdf)" in text
+    assert "![" not in text
+
+
+@pytest.mark.slow
 def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     log, out, report = tmp_path / "log.parquet", tmp_path / "rig.toml", tmp_path / "report"
     write_trial(trial(), log, TRUE)
