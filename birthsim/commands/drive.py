@@ -73,7 +73,7 @@ class Settings(Configured):
     provoke: Annotated[list[str], MANY, Parameter(group=SIMULATED, metavar="KIND@S...")] = field(default_factory=list)
     """Faults of the simulated rig, such as nan-pressure@1.5 or silence@2+0.01."""
     out: Path | None = None
-    """Folder for log.csv, asked.csv, timing.json and, by the clock, timing.png."""
+    """Folder for log.csv, asked.csv, timing.json and, without --lockstep, timing.png."""
 
 
 def main(settings: Settings) -> None:

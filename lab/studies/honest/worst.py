@@ -220,11 +220,11 @@ STUDY = Study(
     allowed={"sensors": tuple(names("sensors")), "metric": tuple(UNITS)},
     words={
         "controller": "registered names",
-        "drawn": "randomise the figures of honest sensors too",
+        "drawn": "randomise the parameters of honest sensors too",
         "limit": "worlds above it are counted",
         "rest": "s before the push",
         "seed": "of the first world",
         "parameters": "TOML file of the rig as the controllers believe it",
     },
 )
-register(study="worst", about="the worst worlds, and what each owes to its figures")(STUDY)
+register(study="worst", about="the worst worlds, and the parameters that cause them")(STUDY)
