@@ -184,8 +184,8 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
         headline(figure, f"Least error where the controller is told its rig: {'; '.join(dict.fromkeys(best))}")
         looks: list[tuple[str, dict[str, Any]]] = [
             *((said, {"color": colour, "marker": marker}) for _, said, colour, marker, _ in beliefs),
-            ("better than every cheaper set", {"color": "0.3", "marker": "D"}),
-            ("no better than a cheaper one", {"color": "0.3", "marker": "D", "mfc": "white"}),
+            ("beats every cheaper set", {"color": "0.3", "marker": "D"}),
+            ("a cheaper set is as good", {"color": "0.3", "marker": "D", "mfc": "white"}),
         ]
         legend_below(figure, also=[Line2D([], [], ls="", ms=4, label=said, **look) for said, look in looks])
         return save(figure, folder, "sensors_bought")

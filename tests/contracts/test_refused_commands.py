@@ -62,6 +62,7 @@ TABLE = {
     "drive --driver can --out x": "driver = 'can'; allowed: udp, simulated, or path/to/file.py:Class",
     "evaluate --env BirthSIM/Square-v1 --out x": "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v2, ",
     "evaluate --controller backsteping --out x": "(did you mean 'backstepping'?); allowed: a registered name",
+    "evaluate --sensors labb --out x": "error: --sensors 'labb' (did you mean 'lab'?)",
     "evaluate --controller own.py:Mine --out x": "own.py' has no 'Mine'; allowed: a name that it defines: ",
     "evaluate --controller residual --policy none --out x": "none' holds no policy; allowed: a folder that birthsim train",
     "evaluate --controller pid": ("--out is missing", "--help"),
