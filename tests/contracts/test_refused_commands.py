@@ -59,7 +59,7 @@ TABLE = {
     "export --to fmu --env BirthSIM/Square-v1 --out x.fmu": "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v2",
     **dict.fromkeys(("evaluate", "figure4", "animate", "train"), "--out"),
     "tune": "--controller",
-    "drive --driver can --out x": "driver = 'can'; allowed: udp, simulated, or path/to/file.py:Class",
+    "drive --driver can --out x": "--driver 'can'; allowed: udp, simulated, or path/to/file.py:Class",
     "evaluate --env BirthSIM/Square-v1 --out x": "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v2, ",
     "evaluate --controller backsteping --out x": "(did you mean 'backstepping'?); allowed: a registered name",
     "evaluate --sensors labb --out x": "error: --sensors 'labb' (did you mean 'lab'?)",
