@@ -113,6 +113,8 @@ def _read_and_act(app: App, settings: type, action: Callable[[Any], None]) -> No
         said, option = " ".join(str(error).split()).rstrip("."), error.argument.name if error.argument else ""
         if isinstance(error, MissingArgumentError) and option not in sys.argv:
             said = f"{option} is missing"
+        # A check of ours says argument and value by itself.
+        said = re.sub(r'^Invalid value "[^"]*" for (--[\w-]+)\. \w+ = ', r"\1 ", said)
         place = "" if option.lstrip("-") in said else f"{option}: "
         missing = isinstance(error, MissingArgumentError | UnknownOptionError | UnusedCliTokensError)
         known = f"; allowed: what {app.name[0]} --help lists" * missing

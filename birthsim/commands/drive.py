@@ -75,7 +75,7 @@ class Settings(Configured):
     """Faults of the simulated rig, such as nan-pressure@1.5 or silence@2+0.01."""
     style: Style = "screen"
     out: Path | None = None
-    """Folder for log.csv, asked.csv, timing.json and, by the clock, the figure timing."""
+    """Folder for log.csv, asked.csv, timing.json and, without --lockstep, the figure timing."""
 
 
 def main(settings: Settings) -> None:

@@ -55,7 +55,7 @@ class Settings(Logged):
     duration: Annotated[float | None, number("S")] = None
     """Duration of the proposed experiment. [default: 12]"""
     controller: Annotated[str | None, CONTROLLER] = None
-    """Controller of --simulate; of what a log reveals it believes the default rig. [default: backstepping]"""
+    """Controller of --simulate, which believes the default values of all that a log can reveal. [default: backstepping]"""
     sensors: Annotated[str | None, SENSORS] = None
     """Sensors of --simulate. [default: lab]"""
     seed: Seed = 0

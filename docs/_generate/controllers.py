@@ -1,6 +1,7 @@
 """Every registered controller and policy: what it is, what it is told, and each of its options and gains."""
 
 import inspect
+import re
 from typing import Any
 
 from agents.policy.shipped import loadable_for
@@ -22,6 +23,9 @@ WITH_ACCELERATION = Parameters().replace({"electronics.acceleration_bandwidth": 
 
 ON_A_RAIL = Parameters().replace({"linkage.kind": "rail"})
 """A rig of one cylinder."""
+
+NUMBERS = re.compile(r"(?:zero or a positive number|a positive number >= (?P<least>\S+) and) <= (?P<most>\S+)")
+"""What a refusal allows, as a table says shorter."""
 
 FRACTION = ("1", "part of the believed Coulomb friction that is fed forward along the reference")
 POSITION_LOOP = ("1/s", r"$\omega$, bandwidth of the position loop")
@@ -206,7 +210,9 @@ def _allowed(controller: str, name: str) -> str:
     try:
         make_controller(controller, **{name: -1.0})
     except ValueError as error:
-        return str(error).partition("; allowed: ")[2]
+        said = str(error).partition("; allowed: ")[2]
+        span = NUMBERS.fullmatch(said)
+        return f"{span['least'] or '0'} to {span['most']}" if span else said
     return ""
 
 

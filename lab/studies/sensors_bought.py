@@ -7,13 +7,15 @@ of part whose errors are simulated (``birthsim_env.physics.electronics``, ``link
 """
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.lines import Line2D
 
 from baselines.bench.statistics import jsonable, penalize_lost, quantile
-from baselines.figures.style import ACCENT, DARK, LINES, PAGE, STYLE, headline, legend_below, look, save
+from baselines.figures.style import ACCENT, DARK, MIDDLE, PAGE, STYLE, headline, legend_below, log_ticks, save
 from baselines.work.tasks import Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -83,6 +85,9 @@ METRICS = {
 }
 """What is kept, median and 95th percentile over the worlds: environment, and head of its column."""
 
+ROWS_APART = 0.2
+"""How far above and below the middle of its row a mark stands, in rows."""
+
 ENVIRONMENTS = tuple(dict.fromkeys(environment for environment, _ in METRICS.values()))
 
 
@@ -140,34 +145,55 @@ def frontier(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _drawn(content: Content, folder: Path) -> list[Path]:
-    names = [one.name for one in SETS]
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, len(METRICS), figsize=(PAGE, 3.0), layout="constrained")
-        best: dict[str, str] = {}
-        for panel, (metric, (_, head)) in zip(axes, METRICS.items(), strict=True):
-            for rigs, colour, dash in ((information.DEFAULT, ACCENT, LINES[1]), (information.TOLD, DARK, LINES[0])):
-                rows = [row for row in content["figures"] if row["rig"] == rigs]
-                points = {}
-                for row in rows:
-                    error = row[metric][0]
-                    if isinstance(error, str):
-                        continue  # lost
-                    price = float(np.sqrt(np.prod(row["price"])))
-                    mark = {**look(names.index(row["sensors"])), "linestyle": "", "color": colour}
-                    label = row["sensors"] if rigs == information.TOLD else None
-                    panel.hlines(error, *row["price"], color=colour, lw=0.5, alpha=0.4)
-                    panel.plot(price, error, **mark, ms=4.5, label=label)
-                    points[row["sensors"]] = price, error
-                line = np.array(frontier(list(points.values())))
-                panel.step(*line.T, where="post", color=colour, ls=dash, lw=0.8, label=f"least for the price, rig {rigs}")
+    """A row for each set, by price, and a column for each metric: in a row of its own no mark can meet another's."""
+    sets = sorted(SETS, key=_middle)
+    beliefs = (
+        (information.DEFAULT, "believes the default rig", ACCENT, "s", ROWS_APART),
+        (information.TOLD, "is told its rig", DARK, "o", -ROWS_APART),
+    )
+    size = PAGE, 1.1 + 0.27 * len(sets)
+    with plt.rc_context({**STYLE, "axes.grid.axis": "x"}):
+        figure, (prices, *panels) = plt.subplots(1, 1 + len(METRICS), figsize=size, sharey=True, layout="constrained")
+        for k, one in enumerate(sets):
+            prices.hlines(-k, *one.price, color=MIDDLE, lw=2.5)
+        prices.set(xscale="log", title="assumed price", xlabel="euro")
+        prices.set_yticks([-k for k in range(len(sets))], [fill(one.name, 24) for one in sets])
+        prices.set_ylim(0.6 - len(sets), 0.6)
+        best: list[str] = []
+        for panel, (metric, (_, head)) in zip(panels, METRICS.items(), strict=True):
+            for rigs, _, colour, marker, above in beliefs:
+                rows = {row["sensors"]: row[metric][0] for row in content["figures"] if row["rig"] == rigs}
+                errors = {one: float(rows[one.name]) for one in sets if not isinstance(rows[one.name], str)}
+                least = frontier([(_middle(one), error) for one, error in errors.items()])
+                for k, one in enumerate(sets):
+                    if one not in errors:
+                        where: Any = panel.get_yaxis_transform()
+                        panel.text(1.0, above - k, "lost", transform=where, color=colour, ha="right", va="center", fontsize=6)
+                        continue
+                    filled = (_middle(one), errors[one]) in least
+                    panel.plot(errors[one], above - k, marker, color=colour, mfc=colour if filled else "white", ms=3.5, mew=0.8)
                 if rigs == information.TOLD:
-                    best[metric] = min(points, key=lambda name: points[name][1])
-            panel.set(xscale="log", yscale="log", xlabel="assumed price (euro)", title=head.replace(", ", " (", 1) + ")")
-        errors = ", ".join(head.rpartition(",")[0] for _, head in METRICS.values())
-        winners = " or ".join(dict.fromkeys(best.values()))
-        headline(figure, f"Told the rig, least {errors}: {winners}")
-        legend_below(figure)
+                    best.append(min(errors, key=lambda one: errors[one]).name)
+            quantity, _, unit = head.rpartition(", ")
+            panel.set(xscale="log", title=quantity.replace(" of ", " of\n"), xlabel=unit)
+            panel.tick_params(axis="y", length=0)
+        for panel in (prices, *panels):
+            log_ticks(panel.xaxis, 1.0)
+            for k in range(0, len(sets), 2):
+                panel.axhspan(-k - 0.5, 0.5 - k, color="0.95", lw=0, zorder=0)
+        headline(figure, f"Least error where the controller is told its rig: {'; '.join(dict.fromkeys(best))}")
+        looks: list[tuple[str, dict[str, Any]]] = [
+            *((said, {"color": colour, "marker": marker}) for _, said, colour, marker, _ in beliefs),
+            ("beats every cheaper set", {"color": "0.3", "marker": "D"}),
+            ("a cheaper set is as good", {"color": "0.3", "marker": "D", "mfc": "white"}),
+        ]
+        legend_below(figure, also=[Line2D([], [], ls="", ms=4, label=said, **look) for said, look in looks])
         return save(figure, folder, "sensors_bought")
+
+
+def _middle(one: Bought) -> float:
+    """Euro, the geometric mean of its range."""
+    return float(np.sqrt(np.prod(one.price)))
 
 
 STUDY = Study(

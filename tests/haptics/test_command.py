@@ -145,4 +145,5 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert best["backdriving"][-1]["refused"].startswith("stiffness setpoint")
     for name in ("haptics_impedance", "haptics_energy", "haptics_release", "stability_hand_mass_held_ideal", "haptics_z_width"):
         assert (out / f"{name}.png").stat().st_size > 20_000
-    assert (out / "haptics.md").read_text() in printed
+    for subject in ("impedance", "energy", "release", "backdriving", "stability"):
+        assert (out / f"haptics-{subject}.md").read_text() in printed

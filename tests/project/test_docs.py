@@ -21,6 +21,7 @@ from birthsim_env import Parameters
 from birthsim_env.ids import environment_ids
 from birthsim_env.registry import names
 from lab.studies.comparison import tables as comparison_tables
+from lab.studies.honest import worst
 from lab.studies.leaderboard import tables as leaderboard_tables
 from lab.studies.scores import tables as score_tables
 from tests.console import ROOT
@@ -213,6 +214,7 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
         "scores.csv": score_tables.DATA,
         "learned.csv": ("policy", *evaluation.DATA),
         "leaderboard.csv": leaderboard_tables.DATA,
+        "worst-causes.csv": worst.DATA,
     }
     assert columns == compared | others
 

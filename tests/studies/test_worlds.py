@@ -56,7 +56,9 @@ def test_what_compares_controllers_does_so_on_the_test_set(name):
 
 @pytest.mark.parametrize("name", ["bandwidth", "haptics"])
 def test_a_bandwidth_names_the_newtons_of_each_sine(name):
-    assert all(re.search(r"(lines|sines?|multisines?) of [\d.]+ N", text) for file, text in texts(name) if file.suffix == ".md")
+    shown = [text for file, text in texts(name) if file.suffix == ".md" and "bandwidth" in text]
+    assert shown
+    assert all(re.search(r"(lines|sines?|multisines?) of [\d.]+ N", text) for text in shown)
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab", "honest"])

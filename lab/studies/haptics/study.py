@@ -13,7 +13,7 @@ from lab.engine.results import Content
 from lab.engine.study import Found, Options, Study, no_pictures
 from lab.studies.haptics.kept import kept
 from lab.studies.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
-from lab.studies.haptics.tables import report
+from lab.studies.haptics.tables import heading, report, reports
 
 UNITS = {
     "stiffness": "N/m", "peak": "N", "bandwidth": "Hz", "unnoticed": "Hz", "unnoticed_without_work": "Hz", "energy": "J",
@@ -46,6 +46,15 @@ def _shown(content: Content, name: str) -> dict[str, str]:
     return {f"{name}.md": report(content["figures"], content["settings"]["parameters"])}
 
 
+def _by_subject(content: Content) -> dict[str, str]:
+    """A file for each subject, which begins with its title: the page that shows it has a heading of its own."""
+    texts, figures = dict[str, str](), content["figures"]
+    for subject, text in reports(figures, content["settings"]["parameters"]).items():
+        title, tables = text.removeprefix("### ").split("\n\n", 1)
+        texts[f"haptics-{subject}.md"] = f"*{title}.* {heading(figures)}\n\n{tables}\n"
+    return texts
+
+
 def _pictures(content: Content, folder: Path) -> list[Path]:
     # pyplot takes half a second to load.
     from lab.studies.haptics.figures import haptic_figures
@@ -53,7 +62,9 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
     return haptic_figures(content["figures"], folder)
 
 
-def _haptics(name: str, draw: Callable[[Content, Path], list[Path]], **options: Any) -> Study:
+def _haptics(
+    show: Callable[[Content], dict[str, str]], draw: Callable[[Content, Path], list[Path]] = no_pictures, **options: Any
+) -> Study:
     """A study of some controllers; the seeds are of worlds on which nothing was tuned or decided."""
     return Study(
         {
@@ -70,7 +81,7 @@ def _haptics(name: str, draw: Callable[[Content, Path], list[Path]], **options: 
         _tasks,
         _kept,
         UNITS,
-        partial(_shown, name=name),
+        show,
         draw,
         allowed={"sensors": tuple(names("sensors")), "subject": SUBJECTS},
         words={
@@ -83,10 +94,9 @@ def _haptics(name: str, draw: Callable[[Content, Path], list[Path]], **options: 
     )
 
 
-STUDY = _haptics("haptics", _pictures)
+STUDY = _haptics(_by_subject, _pictures)
 LIMITS = _haptics(
-    "limits",
-    no_pictures,
+    partial(_shown, name="limits"),
     sensors=("lab", "honest"),
     subject=("hands", "release"),
     seed=6_400_000,
@@ -94,8 +104,7 @@ LIMITS = _haptics(
     controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
 )
 ACCELERATION = _haptics(
-    "acceleration-feel",
-    no_pictures,
+    partial(_shown, name="acceleration-feel"),
     sensors=("lab", "honest"),
     subject=("release",),
     seed=70_000,

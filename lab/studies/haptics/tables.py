@@ -1,6 +1,6 @@
 """What a hand feels, in Markdown: a table for each subject, a row for each law under each kind of sensors."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,21 @@ Runs = Sequence[dict[str, Any]]
 """What ``lab.studies.haptics.kept.kept`` gives, in the order of the rows."""
 
 
+def reports(runs: Runs, parameters: str = "") -> dict[str, str]:
+    """A text for each subject that was measured; controllers believe the rig of a file, ``parameters``."""
+    tables = {
+        "impedance": rendering_table,
+        "energy": energy_table,
+        "release": release_table,
+        "backdriving": backdriving_table,
+        "stability": stability_table,
+    }
+    return {name: own for name, table in tables.items() if (own := table(runs, parameters))}
+
+
 def report(runs: Runs, parameters: str = "") -> str:
-    """All tables for the subjects that were measured; controllers believe the rig of a file, ``parameters``."""
-    tables = rendering_table, release_table, backdriving_table, stability_table
-    parts = [table(runs, parameters) for table in tables]
-    return "\n\n".join([heading(runs), *(part for part in parts if part)]) + "\n"
+    """All tables in one text."""
+    return "\n\n".join([heading(runs), *reports(runs, parameters).values()]) + "\n"
 
 
 def heading(runs: Runs) -> str:
@@ -35,41 +45,40 @@ def heading(runs: Runs) -> str:
 
 
 def rendering_table(runs: Runs, parameters: str = "") -> str:
-    """Impedance, errors, energy, air and saturation at ``PEAK``: median over lanes, and worst."""
-    rows: list[list[Cell]] = []
+    """Bandwidths and errors at ``PEAK``: median over lanes, and worst."""
+    heads = [Head(quantity, WORST) for quantity in (*BANDWIDTHS.values(), *ERRORS.values())]
+    rows = [
+        [
+            *who,
+            *(_pair(piece, name, kept, lost, least=True) for name in BANDWIDTHS),
+            *(_pair(piece, name, kept, lost) for name in ERRORS),
+        ]
+        for who, piece, kept, lost in _under_multisines(runs, parameters)
+    ]
+    best = heads[len(BANDWIDTHS) :], heads[: len(BANDWIDTHS)]
+    return _table(f"### Impedance under {words(PEAK, runs[0]['seed'])}", [*WHO, "N/m", *heads], rows, *best)
+
+
+def energy_table(runs: Runs, parameters: str = "") -> str:
+    """Energy, air, saturation and lost lanes at ``PEAK``: median over lanes, and worst."""
+    heads = [Head(quantity, WORST) for quantity in EFFORTS.values()]
+    rows: list[list[Cell]] = [
+        [*who, *(_pair(piece, name, kept, lost) for name in EFFORTS), str(int(lost.sum()))]
+        for who, piece, kept, lost in _under_multisines(runs, parameters)
+    ]
+    return _table(
+        f"### Energy, air and saturation under {words(PEAK, runs[0]['seed'])}", [*WHO, "N/m", *heads, "lost"], rows, heads
+    )
+
+
+def _under_multisines(runs: Runs, parameters: str) -> Iterator[tuple[list[Cell], dict[str, Any], Array, Array]]:
+    """Of each controller, sensors and stiffness the first cells of a row, what was measured, which lanes are pushed by
+    ``PEAK``, and which of these are lost."""
     for run in runs:
         for piece in run.get("impedance", ()):
             kept = np.array(piece["peak"]) == PEAK
             lost = np.array(piece["lost"], dtype=bool)[kept]
-            rows.append(
-                [
-                    *_who(run, parameters),
-                    f"{piece['stiffness']:g}",
-                    *(
-                        _pair(piece, name, kept, lost, least=True)
-                        for name in ("bandwidth", "unnoticed", "unnoticed_without_work")
-                    ),
-                    *(_pair(piece, name, kept, lost) for name in UNDER_MULTISINES),
-                    str(int(lost.sum())),
-                ]
-            )
-    own = [
-        Head(quantity, WORST)
-        for quantity in (
-            "bandwidth, Hz",
-            "1 JND up to, Hz",
-            "22 % up to, Hz",
-            "JND at 1 Hz",
-            "own error, mm",
-            "error to (19), mm",
-            "energy given, J",
-            "shortage, N s/m",
-            "air, l/min",
-            "saturated, %",
-        )
-    ]
-    columns: list[str | Head] = [*WHO, "N/m", *own, "lost"]
-    return _table(f"### Impedance under {words(PEAK, runs[0]['seed'])}", columns, rows, own[3:], own[:3])
+            yield [*_who(run, parameters), f"{piece['stiffness']:g}"], piece, kept, lost
 
 
 def release_table(runs: Runs, parameters: str = "") -> str:
@@ -149,8 +158,10 @@ def stability_table(runs: Runs, parameters: str = "") -> str:
     return _table(title, columns, rows, (), columns[len(WHO) :])
 
 
-UNDER_MULTISINES = ("noticed", "error_own_mm", "error_spring_mm", "energy", "shortage", "air", "saturation")
-"""Figures of a lane that the table of impedances has with their worst."""
+BANDWIDTHS = {"bandwidth": "bandwidth, Hz", "unnoticed": "1 JND up to, Hz", "unnoticed_without_work": "22 % up to, Hz"}
+ERRORS = {"noticed": "JND at 1 Hz", "error_own_mm": "own error, mm", "error_spring_mm": "error to (19), mm"}
+EFFORTS = {"energy": "energy given, J", "shortage": "shortage, N s/m", "air": "air, l/min", "saturation": "saturated, %"}
+"""Metrics of a lane under multisines -> their heads, of tables that have each with its worst."""
 
 WORST = ("median", "worst")
 LEAST = tuple(Head(name, WORST) for name in ("overshoot, mm", "peak speed, m/s", "kinetic energy, J", "energy given, J"))

@@ -1,5 +1,7 @@
 """The worst of many drawn worlds, the worst that a search finds, and which of its figures makes it so."""
 
+import csv
+import io
 from collections.abc import Sequence
 from typing import Any
 
@@ -35,6 +37,10 @@ LONGEST_REST = 60.0
 """s; assumed: no rig needs longer to come to rest."""
 NAMED, CAUSES = 5, 8
 """Worst drawn worlds that a row names; changes of one figure that are shown, of those that help most."""
+SHOWN = 2
+"""Of these changes those in the table; the data file has all."""
+DATA = ("controller", "sensors", "parameter", "over_believed", "left")
+"""Columns of the data file: what was changed, by which factor it differed, and the metric that is left."""
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -120,7 +126,8 @@ def _shown(content: Content) -> dict[str, str]:
     size, unrest = Head(named, (*SPREAD_AND_WORST, above)), Head("unrest, mm", SPREAD_AND_WORST)
     rows: list[list[Cell | Head]] = [[*head, size, unrest, "lost", Head("worst world", ("drawn", "found"))]]
     worlds = [[*head, "world found", "push, N", "motion asked for, mm", "of the rig's strength, %"]]
-    changed = [[*head, "parameter", "of the world, over the believed one", f"as believed: {named}"]]
+    eased = ["as found", "rest twice as long", "all as believed", "helps most", "helps next"]
+    changed, data = [[*head, *eased]], [list(DATA)]
     for row in content["figures"]:
         facts = information.informed(row["controller"], row["sensors"], parameters=settings["parameters"])
         own, found = [f"`{row['controller']}`", *facts, row["sensors"]], row["found"]
@@ -128,9 +135,10 @@ def _shown(content: Content) -> dict[str, str]:
         rows.append([*own, [*row[metric], str(row["above"])], row["unrest"], str(row["lost"]), largest])
         asked = (found["push_n"], found["way_mm"], 100 * found["strength"])
         worlds.append([*own, str(found["seed"]), *map(digits, asked)])
-        for parameter, was, put, left in found["changes"]:
-            changed.append([*own, f"`{parameter}`", digits(was / put) if put else "an error, put to 0", digits(left)])
-        changed.append([*own, "all that are randomised", "", digits(found["as_believed"])])
+        (_, _, _, rested), *changes = found["changes"]
+        helps = [f"`{parameter}`: {digits(left)}" for parameter, _, _, left in changes[:SHOWN]]
+        changed.append([*own, *map(digits, (found["size"], rested, found["as_believed"])), *helps])
+        data += [[row["controller"], row["sensors"], *cells] for cells in _rows(found)]
     text = (
         f"{settings['episodes']} worlds of {ENVIRONMENT} from seed {settings['seed']}, rigs and scenarios randomised, "
         f"{settings['rest']:g} s of rest before the push; 95 % is the 95th percentile. A *worst world* is a seed and its "
@@ -140,10 +148,20 @@ def _shown(content: Content) -> dict[str, str]:
     alike = [(str(row[4]), str(row[1]), str(row[3])) for row in rows[1:]]
     parts = [text, markdown(rows, (size, unrest), alike=alike), "The worlds that were found:", markdown(worlds)]
     cause = (
-        f"The {named} of these worlds where one parameter is as the controller believes it; in the first row of each world the "
-        "head rests twice as long:"
+        f"The {named} of each worst world: as it was found, with twice the rest before the push, with all randomised "
+        "parameters as the controller believes them, and with one of them alone as it is believed."
     )
-    return {"worst.md": "\n\n".join(parts) + "\n", "worst-causes.md": f"{cause}\n\n{markdown(changed)}\n"}
+    every = io.StringIO()
+    csv.writer(every, lineterminator="\n").writerows(data)
+    texts = {"worst.md": "\n\n".join(parts), "worst-causes.md": f"{cause}\n\n{markdown(changed)}"}
+    return {**{name: f"{text}\n" for name, text in texts.items()}, "worst-causes.csv": every.getvalue()}
+
+
+def _rows(found: dict[str, Any]) -> list[list[str]]:
+    """Of a world that was found each change: the parameter, the world's over the believed one, and what is left."""
+    changes = [[name, f"{was / put:.3g}" if put else "an error put to 0", left] for name, was, put, left in found["changes"]]
+    ends = [["as found", "", found["size"]], ["all that are randomised", "", found["as_believed"]]]
+    return [[name, over, left if isinstance(left, str) else f"{left:.3g}"] for name, over, left in [ends[0], *changes, ends[1]]]
 
 
 def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], float, float]:
@@ -202,11 +220,11 @@ STUDY = Study(
     allowed={"sensors": tuple(names("sensors")), "metric": tuple(UNITS)},
     words={
         "controller": "registered names",
-        "drawn": "randomise the figures of honest sensors too",
+        "drawn": "randomise the parameters of honest sensors too",
         "limit": "worlds above it are counted",
         "rest": "s before the push",
         "seed": "of the first world",
         "parameters": "TOML file of the rig as the controllers believe it",
     },
 )
-register(study="worst", about="the worst worlds, and what each owes to its figures")(STUDY)
+register(study="worst", about="the worst worlds, and the parameters that cause them")(STUDY)
