@@ -118,14 +118,20 @@ def bandwidth(controller: str, sensors: str, push: str, axis: str, column: str =
 
 def test_what_pages_say_in_words_of_bandwidths_holds() -> None:
     """Words round: this fails when a renewed result leaves what docs/explanation/hand.md and laboratory/bandwidth.md say."""
-    adaptive, several = "admittance-adaptive", (3.0, 10.0)
-    assert several[0] < bandwidth(adaptive, "ideal", "10 N", "x") < several[1]
-    assert bandwidth(adaptive, "honest", "10 N", "x") < 1.0
-    for axis in "xy":
-        assert several[0] < bandwidth(adaptive, "honest, acceleration", "10 N", axis) < several[1]
-    assert bandwidth(adaptive, "honest, acceleration", "2 N", "x") < several[0]
-    alone = bandwidth("admittance-sensorless", "honest, acceleration, rig known", "one sine of 20 N", "x", "unnoticed")
-    assert several[0] < alone < several[1]
+    adaptive, accelerated, known = "admittance-adaptive", "honest, acceleration", "honest, acceleration, rig known"
+    said = {("ideal", 2.5, 5.5), ("honest", 0.7, 1.5), (accelerated, 3.0, 4.6), (known, 5.5, 8.5)}
+    for sensors, least, most in said:
+        for axis in "xy":
+            assert least < bandwidth(adaptive, sensors, "10 N", axis) < most, (sensors, axis)
+    assert bandwidth(adaptive, "honest", "slow lines of 4.9 N", "x") == 0.9
+    assert bandwidth(adaptive, "honest", "2 N", "x") < 0.2
+    for push, column, least, most in (
+        ("slow lines of 4.9 N", "bandwidth", 0.3, 0.5),
+        ("slow lines of 4.9 N", "unnoticed", 0.85, 0.95),
+        ("one sine of 20 N", "unnoticed", 4.5, 5.5),
+        ("one sine of 5 N", "unnoticed", 0.15, 0.25),
+    ):
+        assert least < bandwidth("admittance-sensorless", known, push, "x", column) < most, (push, column)
 
 
 def test_a_stiff_hand_makes_most_controllers_tremble_and_the_best_one_little() -> None:
