@@ -156,7 +156,7 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
         figure, (prices, *panels) = plt.subplots(1, 1 + len(METRICS), figsize=size, sharey=True, layout="constrained")
         for k, one in enumerate(sets):
             prices.hlines(-k, *one.price, color=MIDDLE, lw=2.5)
-        prices.set(xscale="log", title="assumed price", xlabel="euro")
+        prices.set(xscale="log", xlabel="assumed price (euro)")
         prices.set_yticks([-k for k in range(len(sets))], [fill(one.name, 24) for one in sets])
         prices.set_ylim(0.6 - len(sets), 0.6)
         best: list[str] = []
@@ -175,7 +175,7 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
                 if rigs == information.TOLD:
                     best.append(min(errors, key=lambda one: errors[one]).name)
             quantity, _, unit = head.rpartition(", ")
-            panel.set(xscale="log", title=quantity.replace(" of ", " of\n"), xlabel=unit)
+            panel.set(xscale="log", xlabel=fill(f"{quantity} ({unit})", 20))
             panel.tick_params(axis="y", length=0)
         for panel in (prices, *panels):
             log_ticks(panel.xaxis, 1.0)
