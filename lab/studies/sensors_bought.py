@@ -172,7 +172,7 @@ def _drawn(content: Content, folder: Path) -> list[Path]:
                         continue
                     filled = (_middle(one), errors[one]) in least
                     panel.plot(errors[one], above - k, marker, color=colour, mfc=colour if filled else "white", ms=3.5, mew=0.8)
-                if rigs == information.TOLD:
+                if rigs == information.TOLD and errors:
                     best.append(min(errors, key=lambda one: errors[one]).name)
             quantity, _, unit = head.rpartition(", ")
             panel.set(xscale="log", xlabel=fill(f"{quantity} ({unit})", 20))
